@@ -6,6 +6,7 @@ mod coherence;
 mod distance;
 mod gather;
 mod hash;
+mod hierarchy;
 mod image_io;
 mod inpaint;
 mod mean_shift;
@@ -133,6 +134,11 @@ mod _rust {
     #[pymodule_export]
     use super::hash::{philox, uniform};
     #[pymodule_export]
+    use super::hierarchy::{
+        choose_disjoint, contour_strength, measure_regions, region_adjacency, region_candidates,
+        sum_regions, watershed_regions,
+    };
+    #[pymodule_export]
     use super::image_io::{decode_image, encode_image, exif_orientation};
     #[pymodule_export]
     use super::inpaint::inpaint;
@@ -153,7 +159,7 @@ mod _rust {
     #[pymodule_export]
     use super::regions::merge_regions;
     #[pymodule_export]
-    use super::seam::{seam_cut, seam_labels, seam_strips};
+    use super::seam::{refine_outlines, seam_cut, seam_labels, seam_strips};
     #[pymodule_export]
     use super::set_threads;
     #[pymodule_export]

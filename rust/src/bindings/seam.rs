@@ -1,11 +1,14 @@
-use numpy::{PyArray1, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use super::{grouped, run, run_small};
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 use crate::kernels::seam::cost::Cost;
-use crate::kernels::seam::{labels, stitch, strip};
+use crate::kernels::seam::{labels, outlines, stitch, strip};
 use crate::{Error, Result};
 
 /// Maximum number of points of a cut that runs on the calling thread.
@@ -208,4 +211,23 @@ fn axes<'py, const D: usize>(
     };
     let found = run(py, None, |monitor| labels::least_energy(&energy, monitor))?;
     Ok((PyArray1::from_vec(py, found.labels), found.energy))
+}
+
+/// Returns labels whose outlines are minimum cuts in bands around the given outlines.
+#[pyfunction]
+pub(super) fn refine_outlines<'py>(
+    py: Python<'py>,
+    labels: PyReadonlyArray2<'py, i32>,
+    inside: PyReadonlyArray2<'py, f32>,
+    price: PyReadonlyArray2<'py, f32>,
+    pull: f32,
+    reach: Vec<u8>,
+) -> PyResult<Bound<'py, PyArray2<i32>>> {
+    let shape = [labels.shape()[0], labels.shape()[1]];
+    let (labels, inside, price) = (labels.as_slice()?, inside.as_slice()?, price.as_slice()?);
+    let evidence = outlines::Evidence { inside, price, pull };
+    let found = run(py, None, |monitor| {
+        outlines::refine(labels, shape, &evidence, &reach, monitor)
+    })?;
+    PyArray1::from_vec(py, found).reshape(shape)
 }

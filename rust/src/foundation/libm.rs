@@ -3,7 +3,7 @@
 //! The standard library calls the system's functions, whose code and rounding depend on the
 //! processor. Only this file names libm.
 
-pub(crate) use ::libm::{exp, sincos};
+pub(crate) use ::libm::{exp, pow, sincos};
 
 /// Returns the D-th root of a positive number: the side of a square of area `x`, or of a cube of
 /// volume `x`.

@@ -6,12 +6,14 @@
 //! | [`cost`] | visibility of a seam between two images, and its scaling to capacities |
 //! | [`planar`] | minimum cuts between opposite borders, open or closed, or around a core, as shortest paths on the dual |
 //! | [`labels`] | binary labels of minimum energy |
+//! | [`outlines`] | outlines of labelled regions as minimum cuts in bands around them |
 //! | [`stitch`] | choice of one of two images for each pixel of a canvas, for overlaps of any shape |
 //! | [`strip`] | the same for two images of the same shape, with a seam from border to border |
 
 pub mod cost;
 pub mod labels;
 pub mod maxflow;
+pub mod outlines;
 mod overlap;
 pub mod planar;
 mod queue;

@@ -1,0 +1,253 @@
+//! Candidates: the nodes of several merge trees, each once, also with their holes filled.
+
+use std::collections::HashMap;
+
+use super::merge::{Cost, Tree, merge};
+use super::{Graph, Sets};
+use crate::foundation::hash::Noise;
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Share of a node's area that its holes may have together.
+const HOLES: f64 = 0.6;
+
+/// Candidates, and the strength of the border between the two parts of each, or 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Candidates {
+    /// The regions of each candidate, in order.
+    pub sets: Sets,
+    /// Largest strength of the border between the two parts, over all trees.
+    pub seam: Vec<f64>,
+}
+
+/// Returns all nodes of the trees of all costs with an area from `least` to `most`. `open` marks
+/// regions that are not part of a hole, as those at the border of the image.
+///
+/// # Errors
+/// Arrays do not fit.
+pub fn candidates(
+    graph: &Graph<'_>,
+    costs: &[Cost],
+    open: &[bool],
+    [least, most]: [f64; 2],
+    monitor: &Monitor,
+) -> Result<Candidates> {
+    graph.check()?;
+    if open.len() != graph.len() {
+        return Err(Error::value("open", format!("must have {} values, got {}", graph.len(), open.len())));
+    }
+    monitor.check()?;
+    let trees = par::map(costs.len(), |i| merge(graph, costs[i]));
+    let near = graph.neighbours();
+    let noise = Noise::new(0);
+    let keys: Vec<u128> = (0..graph.len())
+        .map(|i| noise.words([i as u32, 0, 0, 0]).iter().fold(0, |key, &w| (key << 32) | u128::from(w)))
+        .collect();
+    let mut found = Found { keys, seen: HashMap::new(), out: Candidates::default() };
+    let mut holes = Holes::new(graph, &near, open);
+    for tree in &trees {
+        monitor.check()?;
+        let nodes = Nodes::new(tree, graph.len());
+        for i in 0..tree.parts.len() {
+            let area = tree.area[graph.len() + i];
+            if area > most {
+                continue;
+            }
+            let node = nodes.get(i);
+            if area >= least {
+                found.add(node, tree.seam[i]);
+            }
+            if let Some((filled, area)) = holes.fill(node, HOLES * area)
+                && (least..=most).contains(&area)
+            {
+                found.add(&filled, 0.0);
+            }
+        }
+    }
+    for (i, &area) in graph.area.iter().enumerate() {
+        if (least..=most).contains(&area) {
+            found.add(&[i as u32], 0.0);
+        }
+    }
+    Ok(found.out)
+}
+
+/// The regions of each node of a tree, as ranges of one list.
+struct Nodes {
+    order: Vec<u32>,
+    ranges: Vec<[usize; 2]>,
+}
+
+impl Nodes {
+    fn new(tree: &Tree, regions: usize) -> Self {
+        // Later nodes are above earlier ones: visit from the last, parts below it.
+        let total = regions + tree.parts.len();
+        let mut below = vec![false; total];
+        for part in tree.parts.iter().flatten() {
+            below[*part as usize] = true;
+        }
+        let (mut order, mut ranges) = (Vec::with_capacity(regions), vec![[0, 0]; total]);
+        let mut stack: Vec<(u32, bool)> = Vec::new();
+        for root in (0..total as u32).rev().filter(|&i| !below[i as usize]) {
+            stack.push((root, false));
+            while let Some((node, done)) = stack.pop() {
+                let i = node as usize;
+                if done {
+                    ranges[i][1] = order.len();
+                    continue;
+                }
+                ranges[i][0] = order.len();
+                if i < regions {
+                    order.push(node);
+                    ranges[i][1] = order.len();
+                } else {
+                    stack.push((node, true));
+                    let [p, q] = tree.parts[i - regions];
+                    stack.push((q, false));
+                    stack.push((p, false));
+                }
+            }
+        }
+        ranges.drain(..regions);
+        Self { order, ranges }
+    }
+
+    fn get(&self, i: usize) -> &[u32] {
+        let [from, to] = self.ranges[i];
+        &self.order[from..to]
+    }
+}
+
+/// The candidates found, each once. Sets are told apart by the sum of 128 random bits a region.
+struct Found {
+    keys: Vec<u128>,
+    seen: HashMap<u128, usize>,
+    out: Candidates,
+}
+
+impl Found {
+    fn add(&mut self, set: &[u32], seam: f64) {
+        let key = set.iter().fold(0u128, |key, &i| key.wrapping_add(self.keys[i as usize]));
+        let next = self.out.seam.len();
+        let at = *self.seen.entry(key).or_insert(next);
+        if at < next {
+            self.out.seam[at] = self.out.seam[at].max(seam);
+            return;
+        }
+        let mut sorted = set.to_vec();
+        sorted.sort_unstable();
+        self.out.sets.push(sorted);
+        self.out.seam.push(seam);
+    }
+}
+
+/// Search for regions that a node encloses.
+struct Holes<'a> {
+    area: &'a [f64],
+    near: &'a [Vec<u32>],
+    open: &'a [bool],
+    /// Number of the last search that found a region inside the node, or beside it.
+    inside: Vec<u32>,
+    beside: Vec<u32>,
+    group: Vec<u32>,
+    search: u32,
+    groups: u32,
+}
+
+impl<'a> Holes<'a> {
+    fn new(graph: &Graph<'a>, near: &'a [Vec<u32>], open: &'a [bool]) -> Self {
+        let none = || vec![0; graph.len()];
+        Self { area: graph.area, near, open, inside: none(), beside: none(), group: none(), search: 0, groups: 0 }
+    }
+
+    /// Returns a node with its holes and the area of both, or `None` if it has no holes of at most
+    /// `limit` pixels each.
+    fn fill(&mut self, node: &[u32], limit: f64) -> Option<(Vec<u32>, f64)> {
+        self.search += 1;
+        for &i in node {
+            self.inside[i as usize] = self.search;
+        }
+        let mut filled: Vec<u32> = Vec::new();
+        let (mut stack, mut group) = (Vec::new(), Vec::new());
+        for &i in node {
+            for &start in &self.near[i as usize] {
+                let s = start as usize;
+                if self.inside[s] == self.search || self.beside[s] == self.search {
+                    continue;
+                }
+                self.groups += 1;
+                stack.clear();
+                group.clear();
+                stack.push(start);
+                self.group[s] = self.groups;
+                let (mut total, mut closed) = (0.0, true);
+                while let Some(r) = stack.pop() {
+                    let r = r as usize;
+                    group.push(r as u32);
+                    total += self.area[r];
+                    if self.open[r] || total > limit || self.beside[r] == self.search {
+                        closed = false;
+                        break;
+                    }
+                    for &q in &self.near[r] {
+                        let k = q as usize;
+                        if self.inside[k] != self.search && self.group[k] != self.groups {
+                            self.group[k] = self.groups;
+                            stack.push(q);
+                        }
+                    }
+                }
+                for &r in group.iter().chain(&stack) {
+                    self.beside[r as usize] = self.search;
+                }
+                if closed {
+                    filled.extend(&group);
+                }
+            }
+        }
+        if filled.is_empty() {
+            return None;
+        }
+        filled.extend(node);
+        let area = filled.iter().map(|&i| self.area[i as usize]).sum();
+        Some((filled, area))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ring of regions 1 to 4 around region 0, in region 5.
+    const PAIRS: [[u32; 2]; 12] = [
+        [0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [1, 4], [1, 5], [2, 5], [3, 5], [4, 5],
+    ];
+
+    #[test]
+    fn a_ring_is_found_with_and_without_its_hole() {
+        let mut arcs = [[1.0, 1.0]; 12];
+        for arc in &mut arcs[4..8] {
+            arc[1] = 0.1;
+        }
+        let area = [4.0, 5.0, 5.0, 5.0, 5.0, 100.0];
+        let graph = Graph { area: &area, mean: &[[0.0; 3]; 6], pairs: &PAIRS, arcs: &arcs };
+        let costs = [Cost { arcs: 1.0, means: 0.0, small: 0.0 }];
+        let open = [false, false, false, false, false, true];
+        let found = candidates(&graph, &costs, &open, [4.0, 50.0], &Monitor::default()).unwrap();
+        let sets: Vec<&[u32]> = (0..found.sets.len()).map(|i| found.sets.get(i)).collect();
+        assert!(sets.contains(&&[1, 2, 3, 4][..]) && sets.contains(&&[0, 1, 2, 3, 4][..]));
+        assert!(!sets.iter().any(|s| s.contains(&5)));
+        for (i, set) in sets.iter().enumerate() {
+            assert!(!sets[..i].contains(set));
+        }
+    }
+
+    #[test]
+    fn bad_graphs_are_errors() {
+        let graph = Graph { area: &[1.0], mean: &[[0.0; 3]], pairs: &[[0, 0]], arcs: &[[1.0, 1.0]] };
+        assert!(candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default()).is_err());
+        let graph = Graph { pairs: &[], arcs: &[], ..graph };
+        assert!(candidates(&graph, &[], &[], [0.0, 1.0], &Monitor::default()).is_err());
+        assert_eq!(candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default()).unwrap().sets.len(), 1);
+    }
+}

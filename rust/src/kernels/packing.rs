@@ -1,0 +1,120 @@
+//! Packing: the disjoint sets of the largest total worth, among many that overlap.
+//!
+//! The problem is NP-hard. Sets are first chosen greedily in order of quality. Then a set replaces
+//! all chosen sets that it overlaps if it is worth more than these together, and sets that are free
+//! are added, until nothing changes.
+
+use crate::foundation::par::Monitor;
+use crate::kernels::hierarchy::Sets;
+use crate::{Error, Result};
+
+/// No set.
+const NONE: u32 = u32::MAX;
+
+/// Returns which sets are chosen. Sets with a worth of 0 or less, or NaN, are never chosen. At most
+/// `rounds` rounds of exchanges are made.
+///
+/// # Errors
+/// The numbers of sets differ.
+pub fn choose(
+    sets: &Sets,
+    worth: &[f64],
+    quality: &[f64],
+    rounds: usize,
+    monitor: &Monitor,
+) -> Result<Vec<bool>> {
+    for (argument, values) in [("worth", worth), ("quality", quality)] {
+        if values.len() != sets.len() {
+            let message = format!("must have {} values, got {}", sets.len(), values.len());
+            return Err(Error::value(argument, message));
+        }
+    }
+    monitor.check()?;
+    let sorted = |key: &[f64]| {
+        let mut order: Vec<u32> = (0..sets.len() as u32).filter(|&i| worth[i as usize] > 0.0).collect();
+        order.sort_by(|&a, &b| key[b as usize].total_cmp(&key[a as usize]));
+        order
+    };
+    let mut owner = vec![NONE; sets.bound()];
+    let mut chosen = vec![false; sets.len()];
+    let take = |i: u32, owner: &mut [u32], chosen: &mut [bool]| {
+        chosen[i as usize] = true;
+        for &leaf in sets.get(i as usize) {
+            owner[leaf as usize] = i;
+        }
+    };
+    let free = |i: u32, owner: &[u32]| sets.get(i as usize).iter().all(|&leaf| owner[leaf as usize] == NONE);
+    for i in sorted(quality) {
+        if free(i, &owner) {
+            take(i, &mut owner, &mut chosen);
+        }
+    }
+    let order = sorted(worth);
+    let mut rivals: Vec<u32> = Vec::new();
+    for _ in 0..rounds {
+        monitor.check()?;
+        let mut changed = false;
+        for &i in &order {
+            if chosen[i as usize] {
+                continue;
+            }
+            rivals.clear();
+            rivals.extend(sets.get(i as usize).iter().map(|&leaf| owner[leaf as usize]).filter(|&o| o != NONE));
+            rivals.sort_unstable();
+            rivals.dedup();
+            let rival: f64 = rivals.iter().map(|&r| worth[r as usize]).sum();
+            if worth[i as usize] > rival + 1e-9 {
+                for &r in &rivals {
+                    chosen[r as usize] = false;
+                    for &leaf in sets.get(r as usize) {
+                        owner[leaf as usize] = NONE;
+                    }
+                }
+                take(i, &mut owner, &mut chosen);
+                changed = true;
+            }
+        }
+        for &i in &order {
+            if !chosen[i as usize] && free(i, &owner) {
+                take(i, &mut owner, &mut chosen);
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sets(lists: &[&[u32]]) -> Sets {
+        let mut sets = Sets::default();
+        for list in lists {
+            sets.push(list.iter().copied());
+        }
+        sets
+    }
+
+    #[test]
+    fn two_small_sets_beat_one_that_is_worth_less() {
+        let sets = sets(&[&[0, 1, 2], &[0], &[2], &[1, 2]]);
+        let monitor = Monitor::default();
+        let worth = [3.0, 2.0, 2.0, -1.0];
+        let found = choose(&sets, &worth, &worth, 4, &monitor).unwrap();
+        assert_eq!(found, [true, false, false, false]);
+        let found = choose(&sets, &worth, &[0.1, 0.9, 0.8, 1.0], 4, &monitor).unwrap();
+        assert_eq!(found, [false, true, true, false]);
+    }
+
+    #[test]
+    fn a_set_replaces_those_that_it_is_worth_more_than() {
+        let sets = sets(&[&[0, 1], &[1], &[3]]);
+        let found = choose(&sets, &[5.0, 1.0, f64::NAN], &[0.1, 0.9, 1.0], 4, &Monitor::default()).unwrap();
+        assert_eq!(found, [true, false, false]);
+        assert!(choose(&sets, &[1.0], &[1.0], 1, &Monitor::default()).is_err());
+    }
+}
