@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,24 @@ from texrs._typing import Floats
 
 Values = NDArray[np.float64]
 
-VOICE = 0.28
-"""Largest weight of code words in a quality, per unit of log-likelihood."""
+VOICE = 0.2
+"""Weight of code words in a quality, per unit of log-likelihood. 0.28 loses elements of rare colours, 0.1 finds background."""
 ALIKE = 0.12
 """Weight of the likeness in size and shape to the other elements."""
+SIZE = 0.22
+"""What a size that is far from the usual one takes from a quality, at one spread."""
 FAR = 1.3
 """Distance from the usual size, in spreads, beyond which the size does not count against a candidate any further."""
+RARE = 0.8
+"""Share of the votes of code words against a candidate that a usual shape overrules: elements may have rare colours."""
 LARGER = 0.1
-"""Power of the usual area in the value of a choice."""
-TRUST = {"dark": 1.07, "none": 0.97, "light": 1.0}
-"""Factors of the value of choices whose contours include dark lines, no lines, or light lines."""
+"""Power of the usual area in the value of a choice: of equal choices the one of larger elements wins."""
+CONVEX = 6
+"""Power of the convexity in the value of a choice. On 30 images, 6 picks the best reading of lines most often."""
+STARTS = 4
+"""Number of usual sizes from which the consensus starts. 4 instead of 1 raises the mean F of drawn images by 0.04."""
+ROUNDS = 4
+"""Largest number of rounds of the consensus."""
 FEWEST = 3
 """Least number of elements of a choice."""
 
@@ -86,25 +94,30 @@ def choose_reading(contours: Contours, lines: str) -> Choice | None:
     f = candidates.features
     visible = np.clip(1 - 0.9 * f["frame"] / (f["length"] + f["frame"]), 0.3, 1)
     sizes = np.log(f["area"] / visible)
-    first = choose_size(candidates, base, sizes, np.arange(np.log(least * 1.5), np.log(most), 0.35), total)
-    if first is None:
+    best: tuple[float, NDArray[np.bool_], Values] | None = None
+    seen: set[bytes] = set()
+    for chosen, quality in choose_sizes(candidates, base, sizes, np.arange(np.log(least * 1.5), np.log(most), 0.35)):
+        for _ in range(ROUNDS):
+            if chosen.tobytes() in seen:
+                break
+            seen.add(chosen.tobytes())
+            extra = measure_consensus(candidates, chosen, quality, leaves)
+            weights = np.sqrt(f["area"][chosen]) * np.maximum(quality[chosen] - FLOOR, 0.01)
+            away = measure_gap(sizes, weighted_median(sizes[chosen], weights), f["frame"])
+            spread = np.clip(1.5 * np.median(away[chosen]), 0.3, 0.55)
+            quality = base + extra - SIZE * np.minimum(away / (2.0 * spread), FAR) ** 2
+            again = select(candidates, quality, 6)
+            if again.sum() < FEWEST:
+                break
+            chosen = again
+            value = measure_value(candidates, quality, chosen)
+            if best is None or value > best[0]:
+                best = (value, chosen, quality)
+    if best is None:
         return None
-    chosen, quality = first
-    for _ in range(5):
-        extra = measure_consensus(candidates, chosen, quality, leaves)
-        weights = np.sqrt(f["area"][chosen]) * np.maximum(quality[chosen] - FLOOR, 0.01)
-        away = measure_gap(sizes, weighted_median(sizes[chosen], weights), f["frame"])
-        spread = np.clip(1.5 * np.median(away[chosen]), 0.3, 0.55)
-        quality = base + extra - 0.22 * np.minimum(away / (2.0 * spread), FAR) ** 2
-        again = select(candidates, f["area"] * (quality - FLOOR), quality, 6)
-        if again.sum() < FEWEST:
-            break
-        same, chosen = bool((again == chosen).all()), again
-        if same:
-            break
+    value, chosen, quality = best
     picked = np.flatnonzero(chosen)
     elements = candidates.pick(picked)
-    value = measure_value(f["area"] * (quality - FLOOR), f["area"], chosen, total) * TRUST[lines]
     return Choice(elements.paint(leaves), elements, quality[picked], value, lines, level, strength)
 
 
@@ -119,24 +132,23 @@ def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
     return np.asarray(strength, np.float32), level
 
 
-def choose_size(
-    candidates: Candidates, base: Values, sizes: Values, ladder: Values, total: int
-) -> tuple[NDArray[np.bool_], Values] | None:
-    """Return the choice of the best usual size, and the qualities under it."""
-    best, found = 0.0, None
-    f = candidates.features
+def choose_sizes(
+    candidates: Candidates, base: Values, sizes: Values, ladder: Values
+) -> list[tuple[NDArray[np.bool_], Values]]:
+    """Return the choices of the best usual sizes, and the qualities under each."""
+    found = []
     for size in ladder:
-        quality = base - 0.22 * np.minimum(measure_gap(sizes, size, f["frame"]) / 1.2, 1.5) ** 2
-        worth = f["area"] * (quality - FLOOR)
-        chosen = select(candidates, worth, quality, 2)
-        value = measure_value(worth, f["area"], chosen, total)
-        if chosen.sum() >= FEWEST and value > best:
-            best, found = value, (chosen, quality)
-    return found
+        quality = base - SIZE * np.minimum(measure_gap(sizes, size, candidates.features["frame"]) / 1.2, 1.5) ** 2
+        chosen = select(candidates, quality, 2)
+        if chosen.sum() >= FEWEST:
+            found.append((measure_value(candidates, quality, chosen), chosen, quality))
+    found.sort(key=lambda one: -one[0])
+    return [(chosen, quality) for _, chosen, quality in found[:STARTS]]
 
 
-def select(candidates: Candidates, worth: Values, quality: Values, rounds: int) -> NDArray[np.bool_]:
-    """Return which candidates are in the disjoint set of the largest worth."""
+def select(candidates: Candidates, quality: Values, rounds: int) -> NDArray[np.bool_]:
+    """Return which candidates are in the disjoint set of the largest worth: area times quality above the floor."""
+    worth = candidates.features["area"] * (quality - FLOOR)
     return _rust.choose_disjoint(candidates.starts, candidates.members, worth, quality, rounds)
 
 
@@ -153,12 +165,12 @@ def weighted_median(values: Values, weights: Values) -> float:
     return float(values[order][np.searchsorted(total, total[-1] / 2)])
 
 
-def measure_value(worth: Values, area: Values, chosen: NDArray[np.bool_], total: int) -> float:
-    """Return the value of a choice. Quality counts more than cover, and larger elements win if all else is equal."""
-    if not chosen.any():
-        return 0.0
-    covered, usual = area[chosen].sum() / total, np.median(area[chosen]) / total
-    return float(worth[chosen].sum() / total / max(covered, 1e-6) ** 0.8 * (100 * usual) ** LARGER)
+def measure_value(candidates: Candidates, quality: Values, chosen: NDArray[np.bool_]) -> float:
+    """Return the value of a choice: its mean quality above the floor, more if elements are convex and large."""
+    area = candidates.features["area"][chosen]
+    mean = float((area * (quality[chosen] - FLOOR)).sum() / area.sum())
+    convex = float((area * candidates.features["solid"][chosen]).sum() / area.sum())
+    return mean * convex**CONVEX * float(np.median(area)) ** LARGER
 
 
 def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality: Values, leaves: Leaves) -> Values:
@@ -188,4 +200,6 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     say = weight[some] + 0.05
     like = (np.exp(-far / 2) * (far > 1e-9)) @ say / say.sum()
     like = like / max(float(np.quantile(like[picked], 0.9)), 1e-6)
+    # A shape like those of the others overrules most of what speaks against a rare colour.
+    mean = np.maximum(mean, 0) + np.minimum(mean, 0) * (1 - RARE * np.minimum(like, 1))
     return VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5)
