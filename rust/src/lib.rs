@@ -31,6 +31,10 @@
 //! | [`smooth`] | smoothing of arrays along their axes, such as Gaussian blur |
 //! | [`mean_shift`] | mean-shift filtering in space and colour |
 //! | [`reconstruction`] | grey-scale reconstruction: an image without its small domes |
+//! | [`contours`] | strength of contours: how fast the local histogram of labels changes |
+//! | [`watershed`] | regions around the local minima of an image, and the borders between them |
+//! | [`hierarchy`] | regions merged two by two, and measures of all nodes -> `watershed` |
+//! | [`packing`] | the disjoint sets of the largest total worth -> `hierarchy` |
 //! | [`regions`] | segmentation into regions of similar colour by graph-based merging |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8-bit, 16-bit and float image files, with limits |
@@ -58,6 +62,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, quilt,
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    distance, gather, image_io, inpaint, mean_shift, ncc, nearby, patch_search, poisson,
-    reconstruction, regions, seam, smooth, sparse, warp,
+    contours, distance, gather, hierarchy, image_io, inpaint, mean_shift, ncc, nearby, packing,
+    patch_search, poisson, reconstruction, regions, seam, smooth, sparse, warp, watershed,
 };

@@ -1,5 +1,6 @@
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -22,7 +23,9 @@ pub(super) fn contour_strength<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let shape = [labels.shape()[0], labels.shape()[1]];
     let labels = labels.as_slice()?;
-    let found = run(py, None, |monitor| contours::strength(labels, shape, count, sigma, monitor))?;
+    let found = run(py, None, |monitor| {
+        contours::strength(labels, shape, count, sigma, monitor)
+    })?;
     PyArray1::from_vec(py, found).reshape(shape)
 }
 
@@ -35,12 +38,18 @@ pub(super) fn watershed_regions<'py>(
 ) -> PyResult<(Bound<'py, PyArray2<u32>>, usize)> {
     let shape = [height.shape()[0], height.shape()[1]];
     let height = height.as_slice()?;
-    let (labels, count) = run(py, None, |monitor| watershed::flood(height, shape, reach, monitor))?;
+    let (labels, count) = run(py, None, |monitor| {
+        watershed::flood(height, shape, reach, monitor)
+    })?;
     Ok((PyArray1::from_vec(py, labels).reshape(shape)?, count))
 }
 
 /// Pairs of regions, their borders, and the extreme pixels of regions.
-type Adjacency<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f32>>);
+type Adjacency<'py> = (
+    Bound<'py, PyArray2<u32>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray3<f32>>,
+);
 
 /// Returns the adjacency of regions.
 #[pyfunction]
@@ -60,12 +69,17 @@ pub(super) fn region_adjacency<'py>(
     Ok((
         PyArray1::from_vec(py, found.pairs.into_flattened()).reshape([pairs, 2])?,
         PyArray1::from_vec(py, found.arcs.into_flattened()).reshape([pairs, 3])?,
-        PyArray1::from_vec(py, found.extremes.into_flattened().into_flattened()).reshape([count, DIRECTIONS, 2])?,
+        PyArray1::from_vec(py, found.extremes.into_flattened().into_flattened())
+            .reshape([count, DIRECTIONS, 2])?,
     ))
 }
 
 /// Starts and members of sets, and a value of each.
-type Candidates<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>);
+type Candidates<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f64>>,
+);
 
 /// Returns the nodes of several merge trees of regions. A row of `costs` is (arcs, means, small).
 #[pyfunction]
@@ -87,8 +101,13 @@ pub(super) fn region_candidates<'py>(
         arcs: grouped("arcs", arcs.as_slice()?)?,
     };
     let open = open.as_slice()?;
-    let costs: Vec<Cost> = costs.iter().map(|&[arcs, means, small]| Cost { arcs, means, small }).collect();
-    let found = run(py, None, |monitor| candidates(&graph, &costs, open, [least, most], monitor))?;
+    let costs: Vec<Cost> = costs
+        .iter()
+        .map(|&[arcs, means, small]| Cost { arcs, means, small })
+        .collect();
+    let found = run(py, None, |monitor| {
+        candidates(&graph, &costs, open, [least, most], monitor)
+    })?;
     let starts = found.sets.starts().iter().map(|&s| s as i64).collect();
     Ok((
         PyArray1::from_vec(py, starts),
@@ -127,10 +146,18 @@ pub(super) fn measure_regions<'py>(
         bins,
         extremes: match points.as_chunks() {
             (rows, []) => rows,
-            _ => return Err(Error::value("extremes", format!("must have {DIRECTIONS} points a row")).into()),
+            _ => {
+                return Err(Error::value(
+                    "extremes",
+                    format!("must have {DIRECTIONS} points a row"),
+                )
+                .into());
+            }
         },
     };
-    let found = run(py, None, |monitor| measure::measure(&sets, &values, monitor))?;
+    let found = run(py, None, |monitor| {
+        measure::measure(&sets, &values, monitor)
+    })?;
     let rows: Vec<f64> = found
         .iter()
         .flat_map(|m| {
@@ -152,7 +179,9 @@ pub(super) fn sum_regions<'py>(
     let sets = sets(starts.as_slice()?, members.as_slice()?)?;
     let columns = values.shape()[1];
     let values = values.as_slice()?;
-    let found = run(py, None, |monitor| measure::sums(&sets, values, columns, monitor))?;
+    let found = run(py, None, |monitor| {
+        measure::sums(&sets, values, columns, monitor)
+    })?;
     PyArray1::from_vec(py, found).reshape([sets.len(), columns])
 }
 
@@ -168,6 +197,8 @@ pub(super) fn choose_disjoint<'py>(
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
     let sets = sets(starts.as_slice()?, members.as_slice()?)?;
     let (worth, quality) = (worth.as_slice()?, quality.as_slice()?);
-    let found = run(py, None, |monitor| packing::choose(&sets, worth, quality, rounds, monitor))?;
+    let found = run(py, None, |monitor| {
+        packing::choose(&sets, worth, quality, rounds, monitor)
+    })?;
     Ok(PyArray1::from_vec(py, found))
 }

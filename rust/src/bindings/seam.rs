@@ -225,7 +225,11 @@ pub(super) fn refine_outlines<'py>(
 ) -> PyResult<Bound<'py, PyArray2<i32>>> {
     let shape = [labels.shape()[0], labels.shape()[1]];
     let (labels, inside, price) = (labels.as_slice()?, inside.as_slice()?, price.as_slice()?);
-    let evidence = outlines::Evidence { inside, price, pull };
+    let evidence = outlines::Evidence {
+        inside,
+        price,
+        pull,
+    };
     let found = run(py, None, |monitor| {
         outlines::refine(labels, shape, &evidence, &reach, monitor)
     })?;

@@ -38,10 +38,16 @@ pub fn strength(
         return Err(Error::value("count", message));
     }
     if !(0.3..=30.0).contains(&sigma) {
-        return Err(Error::value("sigma", format!("must be from 0.3 to 30, got {sigma}")));
+        return Err(Error::value(
+            "sigma",
+            format!("must be from 0.3 to 30, got {sigma}"),
+        ));
     }
     if let Some(label) = labels.iter().find(|&&label| usize::from(label) >= count) {
-        return Err(Error::value("labels", format!("must be below {count}, got {label}")));
+        return Err(Error::value(
+            "labels",
+            format!("must be below {count}, got {label}"),
+        ));
     }
     let [rows, columns] = shape;
     if rows == 0 || columns == 0 {
@@ -53,7 +59,12 @@ pub fn strength(
     let mut out = vec![0.0f32; rows * columns];
     par::chunks_mut(&mut out, ROWS * columns, |chunk, out| {
         let first = chunk * ROWS;
-        let window = Window { labels, shape, lanes, weights: &weights };
+        let window = Window {
+            labels,
+            shape,
+            lanes,
+            weights: &weights,
+        };
         window.fill(first, out, sigma as f32);
     });
     monitor.check()?;
@@ -63,8 +74,9 @@ pub fn strength(
 /// Returns normalised weights of a Gaussian at distance 0, 1, ... up to three standard deviations.
 fn gaussian(sigma: f64) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil() as usize;
-    let raw: Vec<f64> =
-        (0..=reach).map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma))).collect();
+    let raw: Vec<f64> = (0..=reach)
+        .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
+        .collect();
     let total = 2.0 * raw.iter().sum::<f64>() - raw[0];
     raw.iter().map(|w| (w / total) as f32).collect()
 }
@@ -120,7 +132,11 @@ impl Window<'_> {
             let x = x as isize;
             for k in -reach..=reach {
                 let at = x + k;
-                let at = if (0..columns as isize).contains(&at) { at as usize } else { mirror(at, columns) };
+                let at = if (0..columns as isize).contains(&at) {
+                    at as usize
+                } else {
+                    mirror(at, columns)
+                };
                 sums[usize::from(labels[at])] += self.weights[k.unsigned_abs()];
             }
         }
@@ -182,7 +198,9 @@ mod tests {
 
     /// Returns an image of two labels, whose border is the column `at`.
     fn halves(shape: [usize; 2], at: usize) -> Vec<u8> {
-        (0..shape[0] * shape[1]).map(|i| u8::from(i % shape[1] >= at)).collect()
+        (0..shape[0] * shape[1])
+            .map(|i| u8::from(i % shape[1] >= at))
+            .collect()
     }
 
     #[test]
@@ -191,7 +209,11 @@ mod tests {
         let found = strength(&halves(shape, 17), shape, 2, 2.0, &Monitor::default()).unwrap();
         for row in found.chunks_exact(40) {
             let peak = (0..40).max_by(|&a, &b| row[a].total_cmp(&row[b])).unwrap();
-            assert!((16..=17).contains(&peak) && row[peak] > 0.5, "{peak} {}", row[peak]);
+            assert!(
+                (16..=17).contains(&peak) && row[peak] > 0.5,
+                "{peak} {}",
+                row[peak]
+            );
             assert!(row[3] < 1e-3 && row[36] < 1e-3);
         }
     }
@@ -206,7 +228,11 @@ mod tests {
     fn threads_do_not_change_the_result() {
         let shape = [70, 33];
         let labels: Vec<u8> = (0..70 * 33).map(|i| ((i * 7919) % 13 % 5) as u8).collect();
-        let with = |n| install(n, || strength(&labels, shape, 5, 1.5, &Monitor::default())).unwrap().unwrap();
+        let with = |n| {
+            install(n, || strength(&labels, shape, 5, 1.5, &Monitor::default()))
+                .unwrap()
+                .unwrap()
+        };
         assert_eq!(with(1), with(3));
     }
 

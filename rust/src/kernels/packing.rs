@@ -31,7 +31,9 @@ pub fn choose(
     }
     monitor.check()?;
     let sorted = |key: &[f64]| {
-        let mut order: Vec<u32> = (0..sets.len() as u32).filter(|&i| worth[i as usize] > 0.0).collect();
+        let mut order: Vec<u32> = (0..sets.len() as u32)
+            .filter(|&i| worth[i as usize] > 0.0)
+            .collect();
         order.sort_by(|&a, &b| key[b as usize].total_cmp(&key[a as usize]));
         order
     };
@@ -43,7 +45,11 @@ pub fn choose(
             owner[leaf as usize] = i;
         }
     };
-    let free = |i: u32, owner: &[u32]| sets.get(i as usize).iter().all(|&leaf| owner[leaf as usize] == NONE);
+    let free = |i: u32, owner: &[u32]| {
+        sets.get(i as usize)
+            .iter()
+            .all(|&leaf| owner[leaf as usize] == NONE)
+    };
     for i in sorted(quality) {
         if free(i, &owner) {
             take(i, &mut owner, &mut chosen);
@@ -59,7 +65,12 @@ pub fn choose(
                 continue;
             }
             rivals.clear();
-            rivals.extend(sets.get(i as usize).iter().map(|&leaf| owner[leaf as usize]).filter(|&o| o != NONE));
+            rivals.extend(
+                sets.get(i as usize)
+                    .iter()
+                    .map(|&leaf| owner[leaf as usize])
+                    .filter(|&o| o != NONE),
+            );
             rivals.sort_unstable();
             rivals.dedup();
             let rival: f64 = rivals.iter().map(|&r| worth[r as usize]).sum();
@@ -113,7 +124,14 @@ mod tests {
     #[test]
     fn a_set_replaces_those_that_it_is_worth_more_than() {
         let sets = sets(&[&[0, 1], &[1], &[3]]);
-        let found = choose(&sets, &[5.0, 1.0, f64::NAN], &[0.1, 0.9, 1.0], 4, &Monitor::default()).unwrap();
+        let found = choose(
+            &sets,
+            &[5.0, 1.0, f64::NAN],
+            &[0.1, 0.9, 1.0],
+            4,
+            &Monitor::default(),
+        )
+        .unwrap();
         assert_eq!(found, [true, false, false]);
         assert!(choose(&sets, &[1.0], &[1.0], 1, &Monitor::default()).is_err());
     }

@@ -33,7 +33,10 @@ pub fn flood(
         return Err(Error::value("height", "must be finite"));
     }
     if height.len() >= NONE as usize {
-        return Err(Error::value("height", format!("must have less than {NONE} pixels")));
+        return Err(Error::value(
+            "height",
+            format!("must have less than {NONE} pixels"),
+        ));
     }
     memory::room("a watershed", height.len(), 16)?;
     monitor.check()?;
@@ -41,7 +44,11 @@ pub fn flood(
     let minima: Vec<bool> = height.iter().zip(&low).map(|(a, b)| a == b).collect();
     let (mut label, count) = components(&minima, shape);
     // Flood. A pixel is queued by the first region that reaches it, at the level of the water.
-    let (least, most) = height.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+    let (least, most) = height
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| {
+            (a.min(v), b.max(v))
+        });
     let scale = (LEVELS - 1) as f32 / (most - least).max(f32::MIN_POSITIVE);
     let level = |p: usize| (((height[p] - least) * scale) as usize).min(LEVELS - 1);
     let mut queue = Levels::new(height.len());
@@ -137,7 +144,11 @@ struct Levels {
 
 impl Levels {
     fn new(pixels: usize) -> Self {
-        Self { first: vec![NONE; LEVELS], last: vec![NONE; LEVELS], next: vec![NONE; pixels] }
+        Self {
+            first: vec![NONE; LEVELS],
+            last: vec![NONE; LEVELS],
+            next: vec![NONE; pixels],
+        }
     }
 
     fn push(&mut self, level: usize, p: u32) {
@@ -200,7 +211,10 @@ pub fn adjacency(
     check_shape("label", &shape, label.len())?;
     check_shape("strength", &shape, strength.len())?;
     if let Some(bad) = label.iter().find(|&&l| l as usize >= count) {
-        return Err(Error::value("label", format!("must be below {count}, got {bad}")));
+        return Err(Error::value(
+            "label",
+            format!("must be below {count}, got {bad}"),
+        ));
     }
     monitor.check()?;
     let [rows, columns] = shape;
@@ -249,7 +263,11 @@ pub fn adjacency(
         }
         arcs.push(sums);
     }
-    Ok(Regions { pairs, arcs, extremes })
+    Ok(Regions {
+        pairs,
+        arcs,
+        extremes,
+    })
 }
 
 #[cfg(test)]
@@ -286,7 +304,10 @@ mod tests {
     #[test]
     fn flat_and_tiny_images_are_one_region() {
         let monitor = Monitor::default();
-        assert_eq!(flood(&[2.0; 12], [3, 4], 2, &monitor).unwrap(), (vec![0; 12], 1));
+        assert_eq!(
+            flood(&[2.0; 12], [3, 4], 2, &monitor).unwrap(),
+            (vec![0; 12], 1)
+        );
         assert_eq!(flood(&[2.0], [1, 1], 2, &monitor).unwrap(), (vec![0], 1));
         assert_eq!(flood(&[], [0, 4], 2, &monitor).unwrap(), (vec![], 0));
         assert!(flood(&[f32::NAN], [1, 1], 2, &monitor).is_err());

@@ -71,10 +71,9 @@ def find_elements(image: object, *, seed: int = 0) -> FoundElements:
     choice = choose(contours)
     if choice is None:
         return nothing(shape)
-    labels = refine_outlines(choice, contours)
-    layout, report = read_layout(labels, choice, contours)
-    full = enlarge(labels, shape)
-    return FoundElements(full, layout, report[layout], np.clip(choice.quality, 0, 1), touches_border(full), report)
+    layout, report = read_layout(choice, contours)
+    labels = refine_outlines(choice.labels, contours, rgb)
+    return FoundElements(labels, layout, report[layout], np.clip(choice.quality, 0, 1), touches_border(labels), report)
 
 
 def nothing(shape: tuple[int, int]) -> FoundElements:
@@ -92,12 +91,6 @@ def reduce(rgb: Floats) -> Floats:
         return rgb
     size = tuple(max(LEAST, round(n * factor)) for n in rgb.shape[:2])
     return np.asarray(resize(rgb, size, order=1, anti_aliasing=factor < 1), np.float32)
-
-
-def enlarge(labels: NDArray[np.int32], shape: tuple[int, int]) -> NDArray[np.int32]:
-    """Return labels at another size."""
-    at = [((np.arange(n) + 0.5) * m / n).astype(np.intp) for n, m in zip(shape, labels.shape, strict=True)]
-    return labels[np.ix_(*at)]
 
 
 def touches_border(labels: NDArray[np.int32]) -> NDArray[np.bool_]:

@@ -14,9 +14,9 @@ from texrs.exemplar.finding._contours import Contours
 Arrangement: TypeAlias = Literal["separate", "heap", "jointed", "net", "none"]
 
 
-def read_layout(labels: NDArray[np.int32], choice: Choice, contours: Contours) -> tuple[Arrangement, dict[str, float]]:
+def read_layout(choice: Choice, contours: Contours) -> tuple[Arrangement, dict[str, float]]:
     """Return the most likely layout, and the probabilities of all."""
-    cues = measure_cues(labels, choice, contours)
+    cues = measure_cues(choice.labels, choice, contours)
     odds = weigh_layouts(cues)
     return max(odds, key=lambda name: odds[name]), odds | cues  # type: ignore[return-value]
 
@@ -40,21 +40,15 @@ def measure_cues(labels: NDArray[np.int32], choice: Choice, contours: Contours) 
 
 
 def measure_contact(labels: NDArray[np.int32], reach: float) -> float:
-    """Return the share of all outlines that lie within `reach` pixels of another element."""
-    rim = np.zeros(labels.shape, bool)
-    near = np.zeros(labels.shape, bool)
-    step = int(reach) + 1
-    for i, box in enumerate(ndimage.find_objects(labels), 1):
-        if box is None:
-            continue
-        grown = tuple(slice(max(0, s.start - step), s.stop + step) for s in box)
-        view = labels[grown]
-        own = view == i
-        edge = own & ~ndimage.binary_erosion(own, border_value=1)
-        rim[grown] |= edge
-        other = (view > 0) & ~own
-        if other.any():
-            near[grown] |= edge & (ndimage.distance_transform_edt(~other) < reach)
+    """Return the share of all outlines that lie within about `reach` pixels of another element."""
+    around = ndimage.minimum_filter(labels, 3, mode="nearest")
+    rim = (labels > 0) & ((around != labels) | (ndimage.maximum_filter(labels, 3, mode="nearest") != labels))
+    size = 2 * round(0.9 * reach) + 1
+    highest = ndimage.maximum_filter(labels, size, mode="nearest")
+    # The background must not count as the lowest label.
+    above = int(labels.max()) + 1
+    lowest = ndimage.minimum_filter(np.where(labels > 0, labels, above), size, mode="nearest")
+    near = rim & ((highest != labels) | (lowest != labels))
     return float(near.sum() / max(rim.sum(), 1))
 
 

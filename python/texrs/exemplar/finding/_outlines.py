@@ -8,34 +8,66 @@ from scipy import ndimage
 
 from texrs import _rust
 from texrs._typing import Floats
-from texrs.exemplar.finding._choice import Choice
 from texrs.exemplar.finding._contours import Contours, blur
+
+Labels = NDArray[np.int32]
 
 BAND = 0.16
 """Half width of the band in which an outline may move, as a share of the side of the element."""
-PULL = 0.6
-"""Evidence that holds an outline in place at the edge of the band."""
-SMOOTH = 0.12
-"""Price of an outline along the clearest contour, beside the price of 1 where there is none."""
+PULL = 0.3
+"""Evidence that holds an outline in place at the edge of the band. 0.2 to 0.6 gave the same IoU within 0.005."""
+WORDS = 0.1
+"""Weight of code words. On 20 images, the mean IoU is 0.839 with 0.1, 0.833 with 0, and 0.829 with 0.2."""
+CLEAREST = 0.05
+"""Price of an outline along the clearest contour, beside a price of 1 where there is none."""
+SHARP = 3.0
+"""How fast the price falls with the contrast. 2 to 4 gave the same IoU within 0.005."""
+SOFT = 0.7
+"""Standard deviation of the blur before the contrast, in pixels. With 1.5 the mean IoU is 0.02 lower."""
 
 
-def refine_outlines(choice: Choice, contours: Contours) -> NDArray[np.int32]:
-    """Return labels whose outlines lie on contours, at the reduced size."""
-    labels = choice.labels
-    n = int(labels.max())
+def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
+    """Return labels at the size of `rgb` whose outlines lie on contours. `labels` are at the reduced size."""
     evidence = weigh_words(labels, contours)
-    strength = blur(choice.strength, 0.5) / choice.level
-    price = SMOOTH + 1 / (1 + (2.0 * strength) ** 2)
-    side = np.sqrt(np.bincount(labels.ravel(), minlength=n + 1))
-    reach = np.clip(np.rint(BAND * side), 1, 12).astype(np.uint8)
+    shape = rgb.shape[0], rgb.shape[1]
+    if labels.shape != shape:
+        labels, evidence = enlarge(labels, shape), enlarge(evidence, shape)
+    contrast = measure_contrast(rgb, max(1.0, max(shape) / max(contours.words.shape)))
+    price = contrast
+    price *= SHARP
+    np.square(price, out=price)
+    price += 1
+    np.reciprocal(price, out=price)
+    price += CLEAREST
+    side = np.sqrt(np.bincount(labels.ravel(), minlength=int(labels.max()) + 1))
+    reach = np.clip(np.rint(BAND * side), 1, 24).astype(np.uint8)
     reach[0] = 0
-    return _rust.refine_outlines(labels, evidence, price.astype(np.float32), PULL, reach.tolist())
+    return _rust.refine_outlines(labels, evidence, price, PULL, reach.tolist())
 
 
-def weigh_words(labels: NDArray[np.int32], contours: Contours) -> Floats:
+def measure_contrast(rgb: Floats, factor: float) -> Floats:
+    """Return the slope of lightness and of two opponent colours, about 1 where it is steep."""
+    red, green, blue = (rgb[..., i] for i in range(3))
+    total = np.zeros(red.shape, np.float32)
+    # About the scales of L*, a* and b* for colours between the primaries.
+    for channel in (30 * red + 59 * green + 11 * blue, 70 * (red - green), 35 * (red + green) - 70 * blue):
+        soft = blur(channel, SOFT * np.sqrt(factor))
+        for axis in (0, 1):
+            if soft.shape[axis] > 2:
+                step = np.zeros_like(soft)
+                first, last = ((slice(None),) * axis + (cut,) for cut in (slice(2, None), slice(None, -2)))
+                step[(slice(None),) * axis + (slice(1, -1),)] = 0.5 * (soft[first] - soft[last])
+                total += np.square(step, out=step)
+    np.sqrt(total, out=total)
+    # Every third pixel is enough for the quantile.
+    total /= np.quantile(total[::3, ::3], 0.95) + 1.0
+    return total
+
+
+def weigh_words(labels: Labels, contours: Contours) -> Floats:
     """Return the evidence of code words that each pixel is inside an element, as a smoothed log-likelihood ratio."""
     edge = ndimage.minimum_filter(labels, 3) != ndimage.maximum_filter(labels, 3)
-    deep = ndimage.distance_transform_edt(~edge)
+    deep = ndimage.distance_transform_edt(~edge) if edge.any() else np.full(labels.shape, float(max(labels.shape)))
     most = np.zeros(labels.max() + 1)
     np.maximum.at(most, labels.ravel(), deep.ravel())
     core = (labels > 0) & (deep > 0.35 * most[labels])
@@ -47,4 +79,10 @@ def weigh_words(labels: NDArray[np.int32], contours: Contours) -> Floats:
     inside = np.bincount(contours.words[core], minlength=contours.count) + few
     outside = np.bincount(contours.words[out], minlength=contours.count) + few
     ratio = np.clip(np.log(inside / inside.sum()) - np.log(outside / outside.sum()), -1.5, 1.5)
-    return np.asarray(0.35 * blur(ratio[contours.words].astype(np.float32), 1.0), np.float32)
+    return np.asarray(WORDS * blur(ratio[contours.words].astype(np.float32), 1.0), np.float32)
+
+
+def enlarge(values: NDArray[np.generic], shape: tuple[int, int]) -> NDArray[np.generic]:
+    """Return values at another size, each pixel from the nearest one."""
+    at = [((np.arange(n) + 0.5) * m / n).astype(np.intp) for n, m in zip(shape, values.shape, strict=True)]
+    return values[np.ix_(*at)]

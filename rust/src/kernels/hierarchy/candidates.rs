@@ -34,16 +34,28 @@ pub fn candidates(
 ) -> Result<Candidates> {
     graph.check()?;
     if open.len() != graph.len() {
-        return Err(Error::value("open", format!("must have {} values, got {}", graph.len(), open.len())));
+        return Err(Error::value(
+            "open",
+            format!("must have {} values, got {}", graph.len(), open.len()),
+        ));
     }
     monitor.check()?;
-    let trees = par::map(costs.len(), |i| merge(graph, costs[i]));
+    let trees = par::map(costs.len(), |i| merge(graph, costs[i], most));
     let near = graph.neighbours();
     let noise = Noise::new(0);
     let keys: Vec<u128> = (0..graph.len())
-        .map(|i| noise.words([i as u32, 0, 0, 0]).iter().fold(0, |key, &w| (key << 32) | u128::from(w)))
+        .map(|i| {
+            noise
+                .words([i as u32, 0, 0, 0])
+                .iter()
+                .fold(0, |key, &w| (key << 32) | u128::from(w))
+        })
         .collect();
-    let mut found = Found { keys, seen: HashMap::new(), out: Candidates::default() };
+    let mut found = Found {
+        keys,
+        seen: HashMap::new(),
+        out: Candidates::default(),
+    };
     let mut holes = Holes::new(graph, &near, open);
     for tree in &trees {
         monitor.check()?;
@@ -127,7 +139,9 @@ struct Found {
 
 impl Found {
     fn add(&mut self, set: &[u32], seam: f64) {
-        let key = set.iter().fold(0u128, |key, &i| key.wrapping_add(self.keys[i as usize]));
+        let key = set
+            .iter()
+            .fold(0u128, |key, &i| key.wrapping_add(self.keys[i as usize]));
         let next = self.out.seam.len();
         let at = *self.seen.entry(key).or_insert(next);
         if at < next {
@@ -157,7 +171,16 @@ struct Holes<'a> {
 impl<'a> Holes<'a> {
     fn new(graph: &Graph<'a>, near: &'a [Vec<u32>], open: &'a [bool]) -> Self {
         let none = || vec![0; graph.len()];
-        Self { area: graph.area, near, open, inside: none(), beside: none(), group: none(), search: 0, groups: 0 }
+        Self {
+            area: graph.area,
+            near,
+            open,
+            inside: none(),
+            beside: none(),
+            group: none(),
+            search: 0,
+            groups: 0,
+        }
     }
 
     /// Returns a node with its holes and the area of both, or `None` if it has no holes of at most
@@ -220,7 +243,18 @@ mod tests {
 
     /// A ring of regions 1 to 4 around region 0, in region 5.
     const PAIRS: [[u32; 2]; 12] = [
-        [0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [1, 4], [1, 5], [2, 5], [3, 5], [4, 5],
+        [0, 1],
+        [0, 2],
+        [0, 3],
+        [0, 4],
+        [1, 2],
+        [2, 3],
+        [3, 4],
+        [1, 4],
+        [1, 5],
+        [2, 5],
+        [3, 5],
+        [4, 5],
     ];
 
     #[test]
@@ -230,8 +264,17 @@ mod tests {
             arc[1] = 0.1;
         }
         let area = [4.0, 5.0, 5.0, 5.0, 5.0, 100.0];
-        let graph = Graph { area: &area, mean: &[[0.0; 3]; 6], pairs: &PAIRS, arcs: &arcs };
-        let costs = [Cost { arcs: 1.0, means: 0.0, small: 0.0 }];
+        let graph = Graph {
+            area: &area,
+            mean: &[[0.0; 3]; 6],
+            pairs: &PAIRS,
+            arcs: &arcs,
+        };
+        let costs = [Cost {
+            arcs: 1.0,
+            means: 0.0,
+            small: 0.0,
+        }];
         let open = [false, false, false, false, false, true];
         let found = candidates(&graph, &costs, &open, [4.0, 50.0], &Monitor::default()).unwrap();
         let sets: Vec<&[u32]> = (0..found.sets.len()).map(|i| found.sets.get(i)).collect();
@@ -244,10 +287,25 @@ mod tests {
 
     #[test]
     fn bad_graphs_are_errors() {
-        let graph = Graph { area: &[1.0], mean: &[[0.0; 3]], pairs: &[[0, 0]], arcs: &[[1.0, 1.0]] };
+        let graph = Graph {
+            area: &[1.0],
+            mean: &[[0.0; 3]],
+            pairs: &[[0, 0]],
+            arcs: &[[1.0, 1.0]],
+        };
         assert!(candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default()).is_err());
-        let graph = Graph { pairs: &[], arcs: &[], ..graph };
+        let graph = Graph {
+            pairs: &[],
+            arcs: &[],
+            ..graph
+        };
         assert!(candidates(&graph, &[], &[], [0.0, 1.0], &Monitor::default()).is_err());
-        assert_eq!(candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default()).unwrap().sets.len(), 1);
+        assert_eq!(
+            candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default())
+                .unwrap()
+                .sets
+                .len(),
+            1
+        );
     }
 }

@@ -58,14 +58,24 @@ pub fn measure<const A: usize>(
     let n = values.extremes.len();
     check_pairs(values.pairs, n)?;
     if values.arcs.len() != values.pairs.len() {
-        let message = format!("must have {} rows, got {}", values.pairs.len(), values.arcs.len());
+        let message = format!(
+            "must have {} rows, got {}",
+            values.pairs.len(),
+            values.arcs.len()
+        );
         return Err(Error::value("arcs", message));
     }
     if Some(values.histograms.len()) != n.checked_mul(values.bins) {
-        return Err(Error::value("histograms", format!("must have {n} rows of {} values", values.bins)));
+        return Err(Error::value(
+            "histograms",
+            format!("must have {n} rows of {} values", values.bins),
+        ));
     }
     if sets.bound() > n {
-        return Err(Error::value("members", format!("must be below {n}, got {}", sets.bound() - 1)));
+        return Err(Error::value(
+            "members",
+            format!("must be below {n}, got {}", sets.bound() - 1),
+        ));
     }
     monitor.check()?;
     // The borders of each region: the other region and the index of the pair.
@@ -76,9 +86,15 @@ pub fn measure<const A: usize>(
     }
     let directions = directions();
     let tasks = par::map(sets.len().div_ceil(CHUNK), |task| {
-        let mut work = Work { inside: vec![0; n], search: 0, own: vec![0.0; values.bins] };
+        let mut work = Work {
+            inside: vec![0; n],
+            search: 0,
+            own: vec![0.0; values.bins],
+        };
         let range = task * CHUNK..((task + 1) * CHUNK).min(sets.len());
-        range.map(|i| work.measure(sets.get(i), values, &near, &directions)).collect::<Vec<_>>()
+        range
+            .map(|i| work.measure(sets.get(i), values, &near, &directions))
+            .collect::<Vec<_>>()
     });
     monitor.check()?;
     Ok(tasks.concat())
@@ -89,7 +105,10 @@ pub fn measure<const A: usize>(
 /// # Errors
 /// A set has a member without values.
 pub fn sums(sets: &Sets, values: &[f64], columns: usize, monitor: &Monitor) -> Result<Vec<f64>> {
-    if columns == 0 || !values.len().is_multiple_of(columns) || sets.bound() > values.len() / columns {
+    if columns == 0
+        || !values.len().is_multiple_of(columns)
+        || sets.bound() > values.len() / columns
+    {
         let message = format!("must have {} rows of {columns} values", sets.bound());
         return Err(Error::value("values", message));
     }
@@ -99,7 +118,9 @@ pub fn sums(sets: &Sets, values: &[f64], columns: usize, monitor: &Monitor) -> R
         for (k, sums) in out.chunks_exact_mut(columns).enumerate() {
             for &i in sets.get(chunk * CHUNK + k) {
                 let row = &values[i as usize * columns..][..columns];
-                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+                sums.iter_mut()
+                    .zip(row)
+                    .for_each(|(sum, value)| *sum += value);
             }
         }
     });
@@ -125,7 +146,11 @@ impl Work {
         self.own.fill(0.0);
         for &i in set {
             self.inside[i as usize] = self.search;
-            for (sum, value) in self.own.iter_mut().zip(&values.histograms[i as usize * bins..]) {
+            for (sum, value) in self
+                .own
+                .iter_mut()
+                .zip(&values.histograms[i as usize * bins..])
+            {
                 *sum += value;
             }
         }
@@ -179,7 +204,11 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(set: &[u32], extremes: &[[[f32; 2]; DIRECTIONS]], directions: &[[f64; 2]; DIRECTIONS]) -> Self {
+    fn new(
+        set: &[u32],
+        extremes: &[[[f32; 2]; DIRECTIONS]],
+        directions: &[[f64; 2]; DIRECTIONS],
+    ) -> Self {
         let mut corners = [[0.0f64; 2]; DIRECTIONS];
         let mut far = [f64::NEG_INFINITY; DIRECTIONS];
         for &i in set {
@@ -193,7 +222,11 @@ impl Shape {
             }
         }
         if set.is_empty() {
-            return Self { hull: 0.0, rectangle: 0.0, extent: 0.0 };
+            return Self {
+                hull: 0.0,
+                rectangle: 0.0,
+                extent: 0.0,
+            };
         }
         let (mut double, mut around) = (0.0, 0.0);
         for k in 0..DIRECTIONS {
@@ -204,8 +237,9 @@ impl Shape {
         let half = DIRECTIONS / 2;
         // The corners are centres of pixels, so a width lacks half a pixel on both sides.
         let width = |k: usize| far[k % DIRECTIONS] + far[(k + half) % DIRECTIONS] + 1.0;
-        let rectangle =
-            (0..half / 2).map(|k| width(k) * width(k + half / 2)).fold(f64::INFINITY, f64::min);
+        let rectangle = (0..half / 2)
+            .map(|k| width(k) * width(k + half / 2))
+            .fold(f64::INFINITY, f64::min);
         Self {
             hull: 0.5 * double.abs() + 0.5 * around + 1.0,
             rectangle,
@@ -243,7 +277,10 @@ mod tests {
         let sets = Sets::new(vec![0, 2, 3], vec![0, 1, 0]).unwrap();
         let both = measure(&sets, &values, &monitor).unwrap();
         assert_eq!((both[0].outer[0], both[0].inner[0]), (20.0, 4.0));
-        assert_eq!((both[0].hull, both[0].rectangle, both[0].extent), (24.0, 24.0, 10.0));
+        assert_eq!(
+            (both[0].hull, both[0].rectangle, both[0].extent),
+            (24.0, 24.0, 10.0)
+        );
         assert!(both[0].contrast > 0.99 && both[0].alike == 0.0);
         assert!((both[1].alike - 4.0 / 14.0).abs() < 1e-9);
         let wrong = Sets::new(vec![0, 1], vec![3]).unwrap();

@@ -53,14 +53,22 @@ impl PartialOrd for Offer {
 impl Ord for Offer {
     /// The cheapest offer is the greatest, then the one of the lowest indices.
     fn cmp(&self, other: &Self) -> Ordering {
-        other.cost.total_cmp(&self.cost).then_with(|| other.pair.cmp(&self.pair))
+        other
+            .cost
+            .total_cmp(&self.cost)
+            .then_with(|| other.pair.cmp(&self.pair))
     }
 }
 
-/// Returns the merge tree of a graph, or of each connected part of it.
-pub fn merge(graph: &Graph<'_>, cost: Cost) -> Tree {
+/// Returns the merge trees of a graph. Nodes of more than `most` pixels absorb their neighbours in the
+/// same order, but are not part of a tree.
+pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
     let n = graph.len();
-    let mut tree = Tree { parts: Vec::new(), seam: Vec::new(), area: graph.area.to_vec() };
+    let mut tree = Tree {
+        parts: Vec::new(),
+        seam: Vec::new(),
+        area: graph.area.to_vec(),
+    };
     let mut mean = graph.mean.to_vec();
     let mut near: Vec<BTreeMap<u32, [f64; 2]>> = vec![BTreeMap::new(); n];
     for (&[p, q], &arc) in graph.pairs.iter().zip(graph.arcs) {
@@ -70,7 +78,9 @@ pub fn merge(graph: &Graph<'_>, cost: Cost) -> Tree {
     let price = |arc: [f64; 2], area: [f64; 2], mean: [[f64; 3]; 2]| {
         let mut value = cost.arcs * arc[1] / arc[0].max(1.0);
         if cost.means != 0.0 {
-            let square: f64 = (0..3).map(|i| (mean[0][i] - mean[1][i]) * (mean[0][i] - mean[1][i])).sum();
+            let square: f64 = (0..3)
+                .map(|i| (mean[0][i] - mean[1][i]) * (mean[0][i] - mean[1][i]))
+                .sum();
             value += cost.means * square.sqrt();
         }
         if cost.small > 0.0 {
@@ -90,14 +100,49 @@ pub fn merge(graph: &Graph<'_>, cost: Cost) -> Tree {
         if gone[i] || gone[j] {
             continue;
         }
-        let new = near.len() as u32;
         let area = [tree.area[i], tree.area[j]];
         let total = area[0] + area[1];
+        let large = [area[0] > most, area[1] > most];
+        if large[0] || large[1] {
+            // The larger part keeps its index. Its mean hardly changes, so only the offers of the
+            // other part's neighbours are new.
+            let (kept, lost) = if area[0] >= area[1] { (p, q) } else { (q, p) };
+            let (k, l) = (kept as usize, lost as usize);
+            let share = tree.area[l] / total;
+            let other = mean[l];
+            mean[k]
+                .iter_mut()
+                .zip(other)
+                .for_each(|(m, o)| *m += share * (o - *m));
+            tree.area[k] = total;
+            gone[l] = true;
+            for (r, arc) in std::mem::take(&mut near[l]) {
+                let i = r as usize;
+                near[i].remove(&lost);
+                if r == kept {
+                    continue;
+                }
+                let entry = near[k].entry(r).or_insert([0.0; 2]);
+                *entry = [entry[0] + arc[0], entry[1] + arc[1]];
+                let arc = *entry;
+                near[i].insert(kept, arc);
+                let cost = price(arc, [total, tree.area[i]], [mean[k], mean[i]]);
+                queue.push(Offer {
+                    cost,
+                    pair: [r, kept],
+                });
+            }
+            continue;
+        }
+        let new = near.len() as u32;
         let arc = near[i].get(&q).copied().unwrap_or([1.0, 0.0]);
         tree.parts.push([p, q]);
-        tree.seam.push(arc[1] / arc[0].max(1.0) * (3.0 * area[0].min(area[1]) / total).min(1.0));
+        tree.seam
+            .push(arc[1] / arc[0].max(1.0) * (3.0 * area[0].min(area[1]) / total).min(1.0));
         tree.area.push(total);
-        mean.push(std::array::from_fn(|k| (mean[i][k] * area[0] + mean[j][k] * area[1]) / total));
+        mean.push(std::array::from_fn(|k| {
+            (mean[i][k] * area[0] + mean[j][k] * area[1]) / total
+        }));
         gone[i] = true;
         gone[j] = true;
         gone.push(false);
@@ -118,7 +163,10 @@ pub fn merge(graph: &Graph<'_>, cost: Cost) -> Tree {
             other.insert(new, arc);
             let k = r as usize;
             let cost = price(arc, [total, tree.area[k]], [mean[new as usize], mean[k]]);
-            queue.push(Offer { cost, pair: [r, new] });
+            queue.push(Offer {
+                cost,
+                pair: [r, new],
+            });
         }
         near.push(joined);
     }
@@ -137,16 +185,57 @@ mod tests {
             pairs: &[[0, 1], [1, 2]],
             arcs: &[[4.0, 4.0], [4.0, 2.0]],
         };
-        let tree = merge(&graph, Cost { arcs: 1.0, means: 0.0, small: 0.0 });
+        let tree = merge(
+            &graph,
+            Cost {
+                arcs: 1.0,
+                means: 0.0,
+                small: 0.0,
+            },
+            100.0,
+        );
         assert_eq!(tree.parts, [[1, 2], [0, 3]]);
         assert_eq!(tree.area[3..], [30.0, 40.0]);
         assert_eq!(tree.seam[0], 0.5);
     }
 
     #[test]
+    fn large_nodes_absorb_their_neighbours() {
+        let graph = Graph {
+            area: &[10.0, 10.0, 20.0, 5.0],
+            mean: &[[0.0; 3]; 4],
+            pairs: &[[0, 1], [1, 2], [0, 3]],
+            arcs: &[[4.0, 4.0], [4.0, 2.0], [1.0, 3.0]],
+        };
+        let tree = merge(
+            &graph,
+            Cost {
+                arcs: 1.0,
+                means: 0.0,
+                small: 0.0,
+            },
+            25.0,
+        );
+        assert_eq!(tree.parts, [[1, 2]]);
+    }
+
+    #[test]
     fn parts_that_do_not_touch_stay_apart() {
-        let graph = Graph { area: &[1.0; 3], mean: &[[0.0; 3]; 3], pairs: &[[0, 2]], arcs: &[[1.0, 1.0]] };
-        let tree = merge(&graph, Cost { arcs: 1.0, means: 1.0, small: 1.0 });
+        let graph = Graph {
+            area: &[1.0; 3],
+            mean: &[[0.0; 3]; 3],
+            pairs: &[[0, 2]],
+            arcs: &[[1.0, 1.0]],
+        };
+        let tree = merge(
+            &graph,
+            Cost {
+                arcs: 1.0,
+                means: 1.0,
+                small: 1.0,
+            },
+            9.0,
+        );
         assert_eq!(tree.parts, [[0, 2]]);
     }
 }

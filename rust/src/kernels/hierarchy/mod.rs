@@ -21,7 +21,10 @@ pub struct Sets {
 
 impl Default for Sets {
     fn default() -> Self {
-        Self { starts: vec![0], members: Vec::new() }
+        Self {
+            starts: vec![0],
+            members: Vec::new(),
+        }
     }
 }
 
@@ -35,7 +38,10 @@ impl Sets {
             && starts.last() == Some(&members.len())
             && starts.is_sorted();
         if !sound {
-            let message = format!("must rise from 0 to {}, the number of members", members.len());
+            let message = format!(
+                "must rise from 0 to {}, the number of members",
+                members.len()
+            );
             return Err(Error::value("starts", message));
         }
         Ok(Self { starts, members })
@@ -106,10 +112,17 @@ impl Graph<'_> {
     pub(crate) fn check(&self) -> Result<()> {
         let n = self.len();
         if self.mean.len() != n {
-            return Err(Error::value("mean", format!("must have {n} rows, got {}", self.mean.len())));
+            return Err(Error::value(
+                "mean",
+                format!("must have {n} rows, got {}", self.mean.len()),
+            ));
         }
         if self.arcs.len() != self.pairs.len() {
-            let message = format!("must have {} rows, got {}", self.pairs.len(), self.arcs.len());
+            let message = format!(
+                "must have {} rows, got {}",
+                self.pairs.len(),
+                self.arcs.len()
+            );
             return Err(Error::value("arcs", message));
         }
         check_pairs(self.pairs, n)
@@ -128,7 +141,10 @@ impl Graph<'_> {
 
 /// Returns an error if a pair is not of two different regions below `count`.
 pub(crate) fn check_pairs(pairs: &[[u32; 2]], count: usize) -> Result<()> {
-    match pairs.iter().find(|&&[p, q]| p == q || p.max(q) as usize >= count) {
+    match pairs
+        .iter()
+        .find(|&&[p, q]| p == q || p.max(q) as usize >= count)
+    {
         Some(pair) => {
             let message = format!("must be of two different regions below {count}, got {pair:?}");
             Err(Error::value("pairs", message))

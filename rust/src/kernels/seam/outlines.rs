@@ -51,7 +51,10 @@ pub fn refine(
     check_shape("labels", &shape, labels.len())?;
     check_shape("inside", &shape, evidence.inside.len())?;
     check_shape("price", &shape, evidence.price.len())?;
-    if let Some(bad) = labels.iter().find(|&&l| l < 0 || l as usize >= reach.len().max(1)) {
+    if let Some(bad) = labels
+        .iter()
+        .find(|&&l| l < 0 || l as usize >= reach.len().max(1))
+    {
         let message = format!("must be from 0 to below {}, got {bad}", reach.len().max(1));
         return Err(Error::value("labels", message));
     }
@@ -62,13 +65,18 @@ pub fn refine(
         return Err(Error::value("price", "must be finite and at least 0"));
     }
     if let Some(bad) = reach.iter().find(|&&r| r > 64) {
-        return Err(Error::value("reach", format!("must be at most 64, got {bad}")));
+        return Err(Error::value(
+            "reach",
+            format!("must be at most 64, got {bad}"),
+        ));
     }
     memory::room("outlines", labels.len(), 12)?;
     monitor.check()?;
     let boxes = boxes(labels, shape, reach.len());
     let claims = par::map(boxes.len(), |i| {
-        let Some(area) = boxes[i].filter(|_| i > 0) else { return Ok(Vec::new()) };
+        let Some(area) = boxes[i].filter(|_| i > 0) else {
+            return Ok(Vec::new());
+        };
         Band::new(labels, shape, area, i as i32, reach[i]).cut(evidence, monitor)
     });
     // Share the claims out, in the order of labels.
@@ -119,10 +127,19 @@ struct Band {
 }
 
 impl Band {
-    fn new(labels: &[i32], [rows, columns]: [usize; 2], [ys, xs]: Box2, label: i32, reach: u8) -> Self {
+    fn new(
+        labels: &[i32],
+        [rows, columns]: [usize; 2],
+        [ys, xs]: Box2,
+        label: i32,
+        reach: u8,
+    ) -> Self {
         let margin = usize::from(reach) + 2;
         let origin = [ys[0].saturating_sub(margin), xs[0].saturating_sub(margin)];
-        let end = [(ys[1] + margin + 1).min(rows), (xs[1] + margin + 1).min(columns)];
+        let end = [
+            (ys[1] + margin + 1).min(rows),
+            (xs[1] + margin + 1).min(columns),
+        ];
         let shape = [end[0] - origin[0], end[1] - origin[1]];
         let mut own = Vec::with_capacity(shape[0] * shape[1]);
         let mut alien = Vec::with_capacity(shape[0] * shape[1]);
@@ -137,13 +154,21 @@ impl Band {
         // A neighbour keeps what lies deeper in it than half of the band.
         let inside = distance(&alien, shape, false);
         let other = inside.iter().map(|&d| d > 0.5 * f32::from(reach)).collect();
-        Self { origin, shape, columns, reach, depth, other }
+        Self {
+            origin,
+            shape,
+            columns,
+            reach,
+            depth,
+            other,
+        }
     }
 
     /// Returns the index and the depth of each pixel inside the new outline.
     fn cut(&self, evidence: &Evidence<'_>, monitor: &Monitor) -> Result<Vec<(u32, f32)>> {
         let [rows, columns] = self.shape;
-        let place = |i: usize| (self.origin[0] + i / columns) * self.columns + self.origin[1] + i % columns;
+        let place =
+            |i: usize| (self.origin[0] + i / columns) * self.columns + self.origin[1] + i % columns;
         let mut inside: Vec<bool> = self.depth.iter().map(|&d| d > 0.0).collect();
         if self.reach > 0 {
             let reach = f32::from(self.reach);
@@ -166,7 +191,9 @@ impl Band {
             }
             let pair = |step: usize| -> Vec<i32> {
                 let next = |i: usize| price.get(i + step).copied().unwrap_or(0.0);
-                (0..price.len()).map(|i| (0.5 * (price[i] + next(i)) * UNIT) as i32).collect()
+                (0..price.len())
+                    .map(|i| (0.5 * (price[i] + next(i)) * UNIT) as i32)
+                    .collect()
             };
             let (down, right) = (pair(columns), pair(1));
             let graph = Graph {
@@ -180,15 +207,24 @@ impl Band {
         }
         self.tidy(&mut inside);
         let claims = inside.iter().enumerate().filter(|(_, flag)| **flag);
-        Ok(claims.map(|(i, _)| (place(i) as u32, self.depth[i])).collect())
+        Ok(claims
+            .map(|(i, _)| (place(i) as u32, self.depth[i]))
+            .collect())
     }
 
     /// Keeps the largest connected part, and fills holes that are not deep in another region.
     fn tidy(&self, inside: &mut [bool]) {
         let parts = parts(inside, self.shape, |_| false);
-        let largest = parts.1.iter().enumerate().max_by_key(|&(i, &size)| (size, std::cmp::Reverse(i)));
+        let largest = parts
+            .1
+            .iter()
+            .enumerate()
+            .max_by_key(|&(i, &size)| (size, std::cmp::Reverse(i)));
         let Some((largest, _)) = largest else { return };
-        inside.iter_mut().zip(&parts.0).for_each(|(flag, &part)| *flag = part == largest as u32);
+        inside
+            .iter_mut()
+            .zip(&parts.0)
+            .for_each(|(flag, &part)| *flag = part == largest as u32);
         let outside: Vec<bool> = inside.iter().map(|flag| !flag).collect();
         let [rows, columns] = self.shape;
         let edge = |i: usize| {
@@ -207,7 +243,11 @@ impl Band {
 
 /// Returns the number of the connected part of each true pixel, and the sizes of all parts: 0 if
 /// `open` holds for one of its pixels.
-fn parts(flags: &[bool], [rows, columns]: [usize; 2], open: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<usize>) {
+fn parts(
+    flags: &[bool],
+    [rows, columns]: [usize; 2],
+    open: impl Fn(usize) -> bool,
+) -> (Vec<u32>, Vec<usize>) {
     let (mut part, mut sizes) = (vec![u32::MAX; flags.len()], Vec::new());
     let mut stack = Vec::new();
     for start in 0..flags.len() {
@@ -245,10 +285,17 @@ fn parts(flags: &[bool], [rows, columns]: [usize; 2], open: impl Fn(usize) -> bo
 fn distance(flags: &[bool], [rows, columns]: [usize; 2], to: bool) -> Vec<f32> {
     const DIAGONAL: f32 = 4.0 / 3.0;
     let far = (rows + columns) as f32;
-    let mut out: Vec<f32> = flags.iter().map(|&f| if f == to { 0.0 } else { far }).collect();
+    let mut out: Vec<f32> = flags
+        .iter()
+        .map(|&f| if f == to { 0.0 } else { far })
+        .collect();
     let relax = |out: &mut [f32], p: usize, q: usize, step: f32| {
         // The outline is half a pixel from the pixels on both sides.
-        let value = if out[q] == 0.0 { step - 0.5 } else { out[q] + step };
+        let value = if out[q] == 0.0 {
+            step - 0.5
+        } else {
+            out[q] + step
+        };
         out[p] = out[p].min(value);
     };
     for y in 0..rows {
@@ -302,14 +349,25 @@ mod tests {
         };
         let truth = (0..900).map(|p| i32::from(inside(p, 0))).collect();
         let first = (0..900).map(|p| i32::from(inside(p, off))).collect();
-        let near = |p: usize| (inside(p, 0) && !inside(p, 1)) || (!inside(p, 0) && (7..23).contains(&(p / 30)) && (7..23).contains(&(p % 30)));
-        (first, (0..900).map(|p| if near(p) { 0.1 } else { 1.0 }).collect(), truth)
+        let near = |p: usize| {
+            (inside(p, 0) && !inside(p, 1))
+                || (!inside(p, 0) && (7..23).contains(&(p / 30)) && (7..23).contains(&(p % 30)))
+        };
+        (
+            first,
+            (0..900).map(|p| if near(p) { 0.1 } else { 1.0 }).collect(),
+            truth,
+        )
     }
 
     #[test]
     fn an_outline_moves_to_the_contour() {
         let (first, price, truth) = square(2);
-        let evidence = Evidence { inside: &[0.0; 900], price: &price, pull: 0.0 };
+        let evidence = Evidence {
+            inside: &[0.0; 900],
+            price: &price,
+            pull: 0.0,
+        };
         let found = refine(&first, [30, 30], &evidence, &[0, 5], &Monitor::default()).unwrap();
         assert_eq!(found, truth);
         let stays = refine(&first, [30, 30], &evidence, &[0, 0], &Monitor::default()).unwrap();
@@ -318,23 +376,67 @@ mod tests {
 
     #[test]
     fn threads_do_not_change_the_result() {
-        let labels: Vec<i32> = (0..900).map(|p| if p / 30 % 7 == 0 { 0 } else { 1 + (p / 30 / 7 * 3 + p % 30 / 10) as i32 }).collect();
-        let noise: Vec<f32> = (0..900).map(|p| ((p * 7919) % 101) as f32 / 101.0).collect();
-        let evidence = Evidence { inside: &noise, price: &noise, pull: 0.2 };
-        let with = |n| install(n, || refine(&labels, [30, 30], &evidence, &[3; 16], &Monitor::default())).unwrap().unwrap();
+        let labels: Vec<i32> = (0..900)
+            .map(|p| {
+                if p / 30 % 7 == 0 {
+                    0
+                } else {
+                    1 + (p / 30 / 7 * 3 + p % 30 / 10) as i32
+                }
+            })
+            .collect();
+        let noise: Vec<f32> = (0..900)
+            .map(|p| ((p * 7919) % 101) as f32 / 101.0)
+            .collect();
+        let evidence = Evidence {
+            inside: &noise,
+            price: &noise,
+            pull: 0.2,
+        };
+        let with = |n| {
+            install(n, || {
+                refine(&labels, [30, 30], &evidence, &[3; 16], &Monitor::default())
+            })
+            .unwrap()
+            .unwrap()
+        };
         assert_eq!(with(1), with(3));
     }
 
     #[test]
     fn bad_values_are_errors() {
-        let evidence = Evidence { inside: &[0.0; 4], price: &[1.0; 4], pull: 0.0 };
+        let evidence = Evidence {
+            inside: &[0.0; 4],
+            price: &[1.0; 4],
+            pull: 0.0,
+        };
         let monitor = Monitor::default();
-        let refine = |labels: &[i32], evidence: &Evidence<'_>| refine(labels, [2, 2], evidence, &[0, 3], &monitor);
+        let refine = |labels: &[i32], evidence: &Evidence<'_>| {
+            refine(labels, [2, 2], evidence, &[0, 3], &monitor)
+        };
         assert!(refine(&[0, 1, 2, 0], &evidence).is_err());
         assert!(refine(&[0, -1, 0, 0], &evidence).is_err());
         assert!(refine(&[0, 1, 0], &evidence).is_err());
-        assert!(refine(&[0, 1, 0, 0], &Evidence { price: &[-1.0; 4], ..evidence }).is_err());
-        assert!(refine(&[0, 1, 0, 0], &Evidence { inside: &[f32::NAN; 4], ..evidence }).is_err());
+        assert!(
+            refine(
+                &[0, 1, 0, 0],
+                &Evidence {
+                    price: &[-1.0; 4],
+                    ..evidence
+                }
+            )
+            .is_err()
+        );
+        assert!(
+            refine(
+                &[0, 1, 0, 0],
+                &Evidence {
+                    inside: &[f32::NAN; 4],
+                    ..evidence
+                }
+            )
+            .is_err()
+        );
         assert_eq!(refine(&[1; 4], &evidence).unwrap(), [1; 4]);
     }
 }
