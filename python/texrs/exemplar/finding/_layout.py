@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,29 +13,62 @@ from texrs.exemplar.finding._contours import Contours
 
 Arrangement: TypeAlias = Literal["separate", "heap", "jointed", "net", "none"]
 
+LAYOUTS: tuple[Arrangement, ...] = ("separate", "heap", "jointed", "net", "none")
+WEIGHTS = {
+    "constant": (-5.4, -3.52, 12.3, 5.67, -9.05),
+    "contact": (-3.99, 3.56, -0.96, 1.1, 0.28),
+    "width": (6.56, -0.91, -4.08, -0.74, -0.83),
+    "value": (1.27, -1.15, 1.65, 1.46, -3.23),
+    "darker_rim": (0.32, 2.53, 0.91, -2.43, -1.33),
+    "rectangular": (-13.33, -12.84, 32.89, 0.76, -7.47),
+    "contrast": (4.37, 4.29, -5.26, -2.23, -1.16),
+    "elongation": (0.04, -2.45, 1.3, -1.84, 2.95),
+    "lighter": (0.27, 1.59, -1.77, 0.14, -0.24),
+}
+"""Weights of the cues for each layout: a logistic regression on 38 textures.
 
-def read_layout(choice: Choice, contours: Contours) -> tuple[Arrangement, dict[str, float]]:
-    """Return the most likely layout, and the probabilities of all."""
-    cues = measure_cues(choice.labels, choice, contours)
-    odds = weigh_layouts(cues)
-    return max(odds, key=lambda name: odds[name]), odds | cues  # type: ignore[return-value]
+With each texture left out in turn, 75 % of the layouts are right; the mean probability of the best layout is 0.80.
+"""
 
 
-def measure_cues(labels: NDArray[np.int32], choice: Choice, contours: Contours) -> dict[str, float]:
-    """Return what a layout is read from: contact, width of the gaps, lightness between elements, quality."""
-    f, light = choice.chosen.features, contours.lab[..., 0]
+def read_layout(choice: Choice, contours: Contours) -> dict[Arrangement, float]:
+    """Return the probability of each layout."""
+    cues = measure_cues(choice, contours)
+    scores = sum(cues[name] * np.array(weights) for name, weights in WEIGHTS.items())
+    odds = np.exp(scores - np.max(scores))
+    return dict(zip(LAYOUTS, (odds / odds.sum()).tolist(), strict=True))
+
+
+def measure_cues(choice: Choice, contours: Contours) -> dict[str, float]:
+    """Return what a layout is read from.
+
+    These are the contact of the elements, the width of the gaps, the value of the choice, the lightness beside the
+    elements and between them, and shape and contrast of the elements.
+    """
+    labels, f, light = choice.labels, choice.chosen.features, contours.lab[..., 0]
     background, inner = labels == 0, labels > 0
     size = float(np.sqrt(np.median(f["area"])))
-    gap = ndimage.distance_transform_edt(background)
-    width = float(np.quantile(gap[background], 0.8) * 2 / size) if background.any() else 0.0
-    lighter = float(light[background].mean() - light[inner].mean()) if background.any() and inner.any() else 0.0
+    width = lighter = darker = 0.0
+    if background.any():
+        width = float(np.quantile(ndimage.distance_transform_edt(background)[background], 0.8) * 2 / size)
+        lighter = float(light[background].mean() - light[inner].mean())
+        # The rim is two pixels wide: joints and crevices are not wider in the reduced image.
+        rim = ndimage.binary_dilation(inner, iterations=2) & background
+        darker = float(light[inner].mean() - light[rim].mean())
+
+    def mean(name: str) -> float:
+        return float((f[name] * f["area"]).sum() / f["area"].sum())
+
     return {
-        "value": choice.value,
-        "quality": float((choice.quality * f["area"]).sum() / f["area"].sum()),
+        "constant": 1.0,
         "contact": measure_contact(labels, max(2.0, 0.22 * size)),
-        "width": width,
-        "lighter": lighter,
-        "light_lines": float(choice.lines == "light"),
+        "width": min(width, 2.0),
+        "value": float(np.log(max(choice.value, 0.02))),
+        "darker_rim": float(np.tanh(darker / 15)),
+        "rectangular": mean("rectangle") - mean("ellipse"),
+        "contrast": mean("contrast"),
+        "elongation": mean("elongation"),
+        "lighter": float(np.tanh(lighter / 15)),
     }
 
 
@@ -50,24 +83,3 @@ def measure_contact(labels: NDArray[np.int32], reach: float) -> float:
     lowest = ndimage.minimum_filter(np.where(labels > 0, labels, above), size, mode="nearest")
     near = rim & ((highest != labels) | (lowest != labels))
     return float(near.sum() / max(rim.sum(), 1))
-
-
-def weigh_layouts(cues: dict[str, float]) -> dict[str, float]:
-    """Return the probability of each layout: a tree of logistic decisions, fitted on 34 images."""
-
-    def sure(z: float) -> float:
-        return float(1 / (1 + np.exp(-0.5 * np.clip(z, -30, 30))))
-
-    nothing = sure((0.30 - cues["value"]) / 0.03 + (0.75 - cues["quality"]) / 0.05)
-    apart = sure((0.45 - cues["contact"]) / 0.05)
-    narrow = sure((0.42 - cues["width"]) / 0.03)
-    # A lighter foreground between the elements lies above them: a net.
-    over = sure((cues["lighter"] - 5) / 6)
-    jointed = sure((cues["contact"] - 0.775) / 0.04 + (0.25 - cues["width"]) / 0.2 + cues["light_lines"])
-    return {
-        "separate": (1 - nothing) * apart * (1 - narrow),
-        "heap": (1 - nothing) * (1 - apart) * (1 - jointed),
-        "jointed": (1 - nothing) * (apart * narrow * (1 - over) + (1 - apart) * jointed),
-        "net": (1 - nothing) * apart * narrow * over,
-        "none": nothing,
-    }

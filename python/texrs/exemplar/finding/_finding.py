@@ -1,0 +1,198 @@
+"""The finder: from an image to its elements, their outlines and their layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._arrays import as_image, as_rgb, as_seed, to_unit
+from texrs._typing import Bools, Floats, Labels
+from texrs.exemplar.finding._choice import Choice, choose
+from texrs.exemplar.finding._contours import find_contours
+from texrs.exemplar.finding._layout import LAYOUTS, Arrangement, read_layout
+from texrs.exemplar.finding._outlines import enlarge, refine_outlines
+from texrs.exemplar.finding._overlaps import Overlap, find_overlaps
+
+WORK = 200, 360
+"""Least and largest length of the longer side of the reduced image, in pixels."""
+LEAST = 8
+"""Length of the shorter side of the reduced image below which nothing is searched for, in pixels."""
+EMPTY = 0.9
+"""Probability of the layout "none" if there are no candidates at all."""
+RIGHT = 0.43, 0.12
+"""Quality at which half of the elements are right, and the spread around it. Fitted on 20 images."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """An element of an image.
+
+    Attributes
+    ----------
+    centre : (float, float)
+        Row and column of the centroid, in pixels.
+    angle : float
+        Angle of the longer axis in radians, from the column axis towards the row axis, -pi/2 to pi/2.
+    scale : float
+        Square root of the ratio of the area to the median area of all elements.
+    area : int
+        Number of pixels.
+    confidence : float
+        Probability that this is a whole element, 0 to 1.
+    at_border : bool
+        Whether the border of the image cuts it.
+    below : tuple of int
+        Numbers of the elements that lie on this one, if the layout is a heap.
+
+    """
+
+    centre: tuple[float, float]
+    angle: float
+    scale: float
+    area: int
+    confidence: float
+    at_border: bool
+    below: tuple[int, ...] = ()
+
+    @property
+    def cut(self) -> bool:
+        """Whether the border of the image or another element cuts it."""
+        return self.at_border or bool(self.below)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundElements:
+    """The elements of an image.
+
+    Attributes
+    ----------
+    labels : int32 array, (H, W)
+        Element of each pixel: 0 is the background, ``i + 1`` is ``elements[i]``.
+    elements : tuple of Element
+        The elements.
+    layout : {"separate", "heap", "jointed", "net", "none"}
+        How the elements lie: on a background, in a heap, as cells that joints part, or as the meshes of a net. "none":
+        a person would not outline elements.
+    confidence : float
+        Probability that the layout is right.
+    layouts : dict of str to float
+        Probability of each layout.
+    overlaps : tuple of Overlap
+        Which element of a heap lies on which.
+
+    """
+
+    labels: Labels
+    elements: tuple[Element, ...]
+    layout: Arrangement
+    confidence: float
+    layouts: dict[Arrangement, float]
+    overlaps: tuple[Overlap, ...] = ()
+
+    @property
+    def background(self) -> Bools:
+        """Pixels that are not part of an element, shape (H, W)."""
+        return self.labels == 0
+
+    def mask(self, number: int) -> Bools:
+        """Return the pixels of an element, shape (H, W). `number` counts from 0."""
+        return self.labels == number + 1
+
+
+def find_elements(image: object, *, seed: int = 0) -> FoundElements:
+    """Find the elements that an image repeats, and how they lie.
+
+    Parameters
+    ----------
+    image : array_like, path_like or PIL.Image.Image
+        Shape (H, W) or (H, W, C), any dtype. The first three channels are colours.
+    seed : int
+        Seed of the pixels that the code words are learned from. Default: 0.
+
+    Returns
+    -------
+    FoundElements
+        ``labels``, ``elements``, ``layout`` and their confidences.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> from texrs.exemplar.finding import find_elements
+    >>> found = find_elements(samples.dots((128, 128)).image)
+    >>> found.layout
+    'separate'
+
+    """
+    pixels = as_image(image, "image")
+    seed = as_seed(seed)
+    rgb = as_rgb(to_unit(pixels))
+    small = reduce(rgb)
+    if min(small.shape[:2]) < LEAST or float(np.ptp(small)) == 0:
+        return report_nothing(rgb.shape[0], rgb.shape[1])
+    contours = find_contours(small, seed)
+    choice = choose(contours)
+    if choice is None:
+        return report_nothing(rgb.shape[0], rgb.shape[1])
+    layouts = read_layout(choice, contours)
+    labels = refine_outlines(choice.labels, contours, rgb)
+    layout = max(LAYOUTS, key=lambda name: layouts[name])
+    overlaps = find_overlaps(enlarge(labels, contours.words.shape)) if layout == "heap" else ()
+    elements = measure_elements(labels, choice, overlaps)
+    return FoundElements(labels, elements, layout, layouts[layout], layouts, overlaps)
+
+
+def report_nothing(rows: int, columns: int) -> FoundElements:
+    """Return the result of an image without elements."""
+    layouts = dict.fromkeys(LAYOUTS, (1 - EMPTY) / (len(LAYOUTS) - 1)) | {"none": EMPTY}
+    return FoundElements(np.zeros((rows, columns), np.int32), (), "none", EMPTY, layouts)
+
+
+def reduce(rgb: Floats) -> Floats:
+    """Return an image whose longer side is in the range of `WORK`."""
+    from skimage.transform import resize
+
+    longer = max(rgb.shape[:2])
+    factor = float(np.clip(1.0, WORK[0] / longer, WORK[1] / longer))
+    # Means of whole blocks first, because a blur of all pixels takes longer than all that follows.
+    block = max(1, int(1 / (2 * factor)))
+    if block > 1:
+        rows, columns = (n // block * block for n in rgb.shape[:2])
+        if min(rows, columns) == 0:
+            return rgb[:1, :1]
+        rgb = rgb[:rows, :columns].reshape(rows // block, block, columns // block, block, 3).mean((1, 3))
+        factor *= block
+    if factor == 1:
+        return rgb
+    size = tuple(max(1, round(n * factor)) for n in rgb.shape[:2])
+    return np.asarray(resize(rgb, size, order=1, anti_aliasing=factor < 1), np.float32)
+
+
+def measure_elements(labels: Labels, choice: Choice, overlaps: tuple[Overlap, ...]) -> tuple[Element, ...]:
+    """Return the measures of all elements."""
+    count = len(choice.chosen)
+    flat = labels.ravel()
+    y, x = (np.broadcast_to(axis, labels.shape).ravel() for axis in np.ogrid[: labels.shape[0], : labels.shape[1]])
+    area = np.bincount(flat, minlength=count + 1)[1:]
+    rows, columns = (np.bincount(flat, axis, count + 1)[1:] / np.maximum(area, 1) for axis in (y, x))
+    usual = float(np.median(area[area > 0])) if area.any() else 1.0
+    border = np.zeros(count + 1, bool)
+    for line in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        border[line] = True
+    above: dict[int, list[int]] = {}
+    for overlap in overlaps:
+        if overlap.confidence > 0.75:
+            above.setdefault(overlap.below, []).append(overlap.above)
+    sure = 1 / (1 + np.exp(-(choice.quality - RIGHT[0]) / RIGHT[1]))
+    return tuple(
+        Element(
+            (float(rows[i]), float(columns[i])),
+            float(choice.chosen.features["angle"][i]),
+            float(np.sqrt(area[i] / usual)),
+            int(area[i]),
+            float(sure[i]),
+            bool(border[i + 1]),
+            tuple(above.get(i, ())),
+        )
+        for i in range(count)
+    )
