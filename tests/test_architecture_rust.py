@@ -12,7 +12,12 @@ RUST = Path(__file__).resolve().parents[1] / "rust" / "src"
 LAYERS = ("foundation", "kernels", "engine", "bindings")
 """Layers, lowest first. A module uses the layers below its own."""
 WITHIN = {
-    "kernels": {"inpaint": {"seam", "patch_search"}, "warp": {"gather"}},
+    "kernels": {
+        "hierarchy": {"watershed"},
+        "inpaint": {"seam", "patch_search"},
+        "packing": {"hierarchy"},
+        "warp": {"gather"},
+    },
     "engine": {
         "guide": {"appearance"},
         "blocks": {"appearance", "guide"},

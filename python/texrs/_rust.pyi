@@ -12,14 +12,17 @@ __all__ = [
     "PatchIndex",
     "PatchSamples",
     "Stitcher",
+    "choose_disjoint",
     "cohere",
     "complete",
+    "contour_strength",
     "decode_image",
     "encode_image",
     "exif_orientation",
     "gather",
     "jitter",
     "mean_shift",
+    "measure_regions",
     "merge_regions",
     "outlines",
     "philox",
@@ -28,6 +31,9 @@ __all__ = [
     "poisson_spread",
     "quilt",
     "reconstruct",
+    "refine_outlines",
+    "region_adjacency",
+    "region_candidates",
     "seam_cut",
     "seam_labels",
     "seam_strips",
@@ -35,10 +41,12 @@ __all__ = [
     "similar",
     "smooth",
     "sum_nearby",
+    "sum_regions",
     "uniform",
     "upsample",
     "warp_mesh",
     "warp_points",
+    "watershed_regions",
 ]
 
 VERSION: Final[str]
@@ -189,6 +197,40 @@ def quilt(
     progress: Callable[[float], object] | None,
 ) -> tuple[NDArray[uint32], NDArray[uint32]]: ...
 def reconstruct(seed: NDArray[float32], mask: NDArray[float32], wrap: Sequence[bool]) -> NDArray[float32]: ...
+def contour_strength(labels: NDArray[uint8], count: int, sigma: float) -> NDArray[float32]: ...
+def watershed_regions(height: NDArray[float32], reach: int) -> tuple[NDArray[uint32], int]: ...
+def region_adjacency(
+    labels: NDArray[uint32], strength: NDArray[float32], count: int, weak: float
+) -> tuple[NDArray[uint32], NDArray[float64], NDArray[float32]]: ...
+def region_candidates(
+    area: NDArray[float64],
+    mean: NDArray[float64],
+    pairs: NDArray[uint32],
+    arcs: NDArray[float64],
+    open: NDArray[bool_],
+    costs: Sequence[Sequence[float]],
+    least: float,
+    most: float,
+) -> tuple[NDArray[int64], NDArray[uint32], NDArray[float64]]: ...
+def measure_regions(
+    starts: NDArray[int64],
+    members: NDArray[uint32],
+    pairs: NDArray[uint32],
+    arcs: NDArray[float64],
+    histograms: NDArray[float32],
+    extremes: NDArray[float32],
+) -> NDArray[float64]: ...
+def sum_regions(starts: NDArray[int64], members: NDArray[uint32], values: NDArray[float64]) -> NDArray[float64]: ...
+def choose_disjoint(
+    starts: NDArray[int64],
+    members: NDArray[uint32],
+    worth: NDArray[float64],
+    quality: NDArray[float64],
+    rounds: int,
+) -> NDArray[bool_]: ...
+def refine_outlines(
+    labels: NDArray[int32], inside: NDArray[float32], price: NDArray[float32], pull: float, reach: Sequence[int]
+) -> NDArray[int32]: ...
 def seam_cut(
     a: NDArray[float32],
     b: NDArray[float32],

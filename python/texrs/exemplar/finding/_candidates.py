@@ -58,7 +58,10 @@ def make_leaves(strength: Floats, contours: Contours, clear: float) -> Leaves:
     labels, count = _rust.watershed_regions(smooth, 2)
     pairs, arcs, extremes = _rust.region_adjacency(labels, smooth, count, clear)
     flat = labels.ravel().astype(np.intp)
-    y, x = (np.broadcast_to(axis, labels.shape).astype(np.float64) for axis in np.ogrid[: labels.shape[0], : labels.shape[1]])
+    y, x = (
+        np.broadcast_to(axis, labels.shape).astype(np.float64)
+        for axis in np.ogrid[: labels.shape[0], : labels.shape[1]]
+    )
 
     def add(values: NDArray[np.generic]) -> NDArray[np.float64]:
         return np.bincount(flat, values.ravel(), count)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import _rust
+from texrs._typing import Floats
 from texrs.exemplar.finding._candidates import Candidates, Leaves, make_candidates, make_leaves
 from texrs.exemplar.finding._contours import Contours, blur
 from texrs.exemplar.finding._quality import FLOOR, measure_quality
-from texrs._typing import Floats
 
 Values = NDArray[np.float64]
 
@@ -21,6 +21,8 @@ ALIKE = 0.12
 """Weight of the likeness in size and shape to the other elements."""
 SIZE = 0.22
 """What a size that is far from the usual one takes from a quality, at one spread."""
+BLEND = 0.1
+"""What an outline that looks alike on both sides takes from a quality, if those of the other elements do not."""
 FAR = 1.3
 """Distance from the usual size, in spreads, beyond which the size does not count against a candidate any further."""
 RARE = 0.8
@@ -205,4 +207,7 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     like = like / max(float(np.quantile(like[picked], 0.9)), 1e-6)
     # A shape like those of the others overrules most of what speaks against a rare colour.
     mean = np.maximum(mean, 0) + np.minimum(mean, 0) * (1 - RARE * np.minimum(like, 1))
-    return VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5)
+    # Patches of the background look like what is beside them, more so than the elements do.
+    usual = weighted_median(f["alike"][picked], np.sqrt(f["area"][picked]))
+    blend = np.clip((f["alike"] - usual - 0.1) / 0.4, 0, 1)
+    return -BLEND * blend + VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5)

@@ -1,0 +1,158 @@
+"""The finder of elements: generated samples with truth, layouts, threads, and inputs that are not textures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import texrs
+from texrs import samples
+from texrs.errors import InvalidInput
+from texrs.exemplar.finding import FoundElements, find_elements
+
+
+def rate(found: FoundElements, truth: NDArray[np.int32]) -> tuple[float, float]:
+    """Return the F measure at an overlap of one half, and the mean overlap. Small parts at the border do not count."""
+    area, own = np.bincount(truth.ravel()), np.bincount(found.labels.ravel())
+    both = np.zeros((len(area), len(own)))
+    np.add.at(both, (truth, found.labels), 1)
+    iou = both / (area[:, None] + own[None] - both)
+    iou[0] = iou[:, 0] = 0
+    least = 0.3 * np.median(area[1:][area[1:] > 0])
+    right = iou > 0.5
+    counts, found_counts = area >= least, (own >= least) | right.any(axis=0)
+    counts[0] = found_counts[0] = False
+    pairs = int(right[counts].sum())
+    return 2 * pairs / (counts.sum() + found_counts.sum()), float(iou[right].mean())
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "layout"),
+    [
+        ("dots", 0.92, "separate"),
+        ("leaves_and_flowers", 0.9, "separate"),
+        ("pebbles", 0.9, "separate"),
+        ("scales", 0.95, "heap"),
+        ("net", 0.92, "net"),
+        ("bricks", 0.85, "jointed"),
+        ("weave", 0.7, "jointed"),
+        ("beans", 0.75, "heap"),
+    ],
+)
+def test_generated_elements_are_found(name: str, least: float, layout: str) -> None:
+    sample = samples.load(name, size=(256, 256), seed=0)
+    assert sample.labels is not None
+    found = find_elements(sample.image)
+    f, iou = rate(found, sample.labels)
+    assert f >= least
+    assert iou >= 0.73
+    assert found.layout == layout
+
+
+@pytest.mark.parametrize("name", ["bark", "grit"])
+def test_textures_without_elements_have_no_layout(name: str) -> None:
+    assert find_elements(samples.load(name, size=(256, 256), seed=0).image).layout == "none"
+
+
+def test_the_parts_of_a_result_agree() -> None:
+    found = find_elements(samples.beans((128, 128)).image)
+    assert len(found.elements) == found.labels.max()
+    assert sum(found.layouts.values()) == pytest.approx(1)
+    assert found.confidence == max(found.layouts.values())
+    for i, element in enumerate(found.elements):
+        mask = found.mask(i)
+        assert mask.sum() == element.area
+        assert element.centre == pytest.approx(np.argwhere(mask).mean(axis=0)) if element.area else True
+        assert 0 <= element.confidence <= 1
+        assert element.at_border == bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
+    assert (found.background == (found.labels == 0)).all()
+    for overlap in found.overlaps:
+        assert overlap.above != overlap.below
+        assert 0.5 <= overlap.confidence <= 1
+
+
+def test_threads_do_not_change_a_result() -> None:
+    image = samples.pebbles((160, 120)).image
+    results = []
+    for threads in (1, 3):
+        with texrs.threads(threads):
+            results.append(find_elements(image))
+    assert (results[0].labels == results[1].labels).all()
+    assert results[0].elements == results[1].elements
+    assert results[0].layouts == results[1].layouts
+
+
+def test_other_types_of_one_image_give_one_result() -> None:
+    image = samples.dots((96, 96)).image
+    expected = find_elements(image).labels
+    assert (find_elements(image.astype(np.uint16) * 257).labels == expected).all()
+    assert (find_elements(image.astype(np.float32) / np.float32(255)).labels == expected).all()
+
+
+def test_grey_images_of_any_shape_are_allowed() -> None:
+    image = samples.dots((128, 128)).image
+    assert find_elements(image[..., 0]).labels.shape == (128, 128)
+    assert find_elements(image[..., :2]).labels.shape == (128, 128)
+    assert find_elements(image[..., 0] > 128).labels.dtype == np.int32
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.full((64, 64, 3), 7, np.uint8),
+        np.zeros((1, 1), np.float32),
+        np.zeros((1, 5000), np.uint8),
+        np.tile(np.arange(256, dtype=np.uint8), (3, 4)),
+        np.eye(12) > 0,
+        np.random.default_rng(0).random((40, 3000)).astype(np.float32),
+    ],
+    ids=["constant", "pixel", "line", "strip", "tiny", "long"],
+)
+def test_images_without_elements_are_allowed(image: NDArray[Any]) -> None:
+    found = find_elements(image)
+    assert found.labels.shape == image.shape[:2]
+    assert found.layout in found.layouts
+
+
+@pytest.mark.parametrize("image", [np.full((32, 32), np.nan), np.zeros((0, 4)), np.zeros(3), "no file"])
+def test_bad_images_are_errors(image: object) -> None:
+    with pytest.raises((InvalidInput, texrs.errors.TexrsError)):
+        find_elements(image)
+
+
+def test_a_stain_is_not_a_joint() -> None:
+    # Four tiles a row with dark joints; a soft stain covers a part of some of them.
+    rows, columns = np.mgrid[:160, :160]
+    noise = np.random.default_rng(1).normal(0, 3, (160, 160))
+    image = 150 + noise + 12 * ((rows // 40 + columns // 40) % 3)
+    stain = np.hypot(rows - 60, columns - 62) < 13
+    image[stain] -= 25
+    image[(rows % 40 < 3) | (columns % 40 < 3)] = 40
+    truth = np.where((rows % 40 < 3) | (columns % 40 < 3), 0, 1 + rows // 40 * 4 + columns // 40).astype(np.int32)
+    found = find_elements(image.clip(0, 255).astype(np.uint8))
+    f, _ = rate(found, truth)
+    assert f >= 0.9
+    assert found.layout == "jointed"
+
+
+def test_the_upper_one_of_two_discs_is_known() -> None:
+    # Discs in diagonal rows, each over the one before it.
+    rows, columns = np.mgrid[:200, :200]
+    image = np.full((200, 200), 20.0)
+    order = np.full((200, 200), -1)
+    for k, (y, x) in enumerate((y, x) for y in range(0, 240, 34) for x in range(0, 240, 34)):
+        inside = np.hypot(rows - y, columns - x) < 22
+        image[inside] = (200 - 3.0 * np.hypot(rows - y, columns - x))[inside]
+        order[inside] = k
+    found = find_elements(image.clip(0, 255).astype(np.uint8))
+    right = []
+    for overlap in found.overlaps:
+        if overlap.confidence > 0.8:
+            above, below = (np.bincount(order[found.mask(i)] + 1).argmax() for i in (overlap.above, overlap.below))
+            right.append(above > below)
+    assert found.layout == "heap"
+    assert len(right) > 20
+    assert np.mean(right) > 0.85
