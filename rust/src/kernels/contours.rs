@@ -5,7 +5,7 @@
 //! eigenvalue, times the standard deviation of the Gaussian.
 
 use crate::foundation::error::check_shape;
-use crate::foundation::libm;
+use crate::foundation::libm::exp;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
@@ -75,7 +75,7 @@ pub fn strength(
 fn gaussian(sigma: f64) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil() as usize;
     let raw: Vec<f64> = (0..=reach)
-        .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
+        .map(|i| exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
         .collect();
     let total = 2.0 * raw.iter().sum::<f64>() - raw[0];
     raw.iter().map(|w| (w / total) as f32).collect()

@@ -5,7 +5,7 @@
 //! neighbours. Heights are rounded to 4096 levels, so that the queue is a list for each level.
 
 use crate::foundation::error::check_shape;
-use crate::foundation::libm;
+use crate::foundation::libm::sincos;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
@@ -190,7 +190,7 @@ pub struct Regions {
 pub fn directions() -> [[f64; 2]; DIRECTIONS] {
     std::array::from_fn(|i| {
         let angle = std::f64::consts::TAU * i as f64 / DIRECTIONS as f64;
-        let (sine, cosine) = libm::sincos(angle);
+        let (sine, cosine) = sincos(angle);
         [sine, cosine]
     })
 }

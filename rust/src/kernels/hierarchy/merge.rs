@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::Graph;
-use crate::foundation::libm;
+use crate::foundation::libm::pow;
 
 /// What it costs to merge two regions: the mean strength along their border and the distance of
 /// their mean values, each with a weight.
@@ -84,7 +84,7 @@ pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
             value += cost.means * square.sqrt();
         }
         if cost.small > 0.0 {
-            value *= libm::pow(area[0].min(area[1]) / cost.small, POWER);
+            value *= pow(area[0].min(area[1]) / cost.small, POWER);
         }
         value
     };
