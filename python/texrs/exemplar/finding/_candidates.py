@@ -64,7 +64,7 @@ def make_leaves(strength: Floats, contours: Contours, clear: float) -> Leaves:
     )
 
     def add(values: NDArray[np.generic]) -> NDArray[np.float64]:
-        return np.bincount(flat, values.ravel(), count)
+        return np.bincount(flat, values.ravel(), count).astype(np.float64)
 
     area = np.bincount(flat, minlength=count).astype(np.float64)
     moments = [area, add(y), add(x), add(y * y), add(x * x), add(y * x), add(smooth)]

@@ -178,7 +178,7 @@ def measure_value(candidates: Candidates, quality: Values, chosen: NDArray[np.bo
     area = candidates.features["area"][chosen]
     mean = float((area * (quality[chosen] - FLOOR)).sum() / area.sum())
     convex = float((area * candidates.features["solid"][chosen]).sum() / area.sum())
-    return mean * convex**CONVEX * float(np.median(area)) ** LARGER
+    return float(mean * convex**CONVEX * np.median(area) ** LARGER)
 
 
 def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality: Values, leaves: Leaves) -> Values:
@@ -214,4 +214,4 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     # Patches of the background look like what is beside them, more so than the elements do.
     usual = weighted_median(f["alike"][picked], np.sqrt(f["area"][picked]))
     blend = np.clip((f["alike"] - usual - 0.1) / 0.4, 0, 1)
-    return -BLEND * blend + VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5)
+    return np.asarray(-BLEND * blend + VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5))

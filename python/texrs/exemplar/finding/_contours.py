@@ -81,7 +81,7 @@ def make_words(lab: Floats, seed: int) -> tuple[Words, int]:
 
 def blur(values: Floats, sigma: float, order: tuple[int, int] = (0, 0)) -> Floats:
     """Return values smoothed by a Gaussian of three standard deviations' reach, or derivatives of them."""
-    return ndimage.gaussian_filter(values, sigma, order, truncate=3.0)
+    return np.asarray(ndimage.gaussian_filter(values, sigma, order, truncate=3.0))
 
 
 def measure_edges(lab: Floats, words: Words, count: int) -> Floats:
@@ -106,4 +106,5 @@ def measure_lines(light: Floats) -> tuple[Floats, Floats]:
         mean, half = (xx + yy) / 2, np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
         np.maximum(dark, (mean + half) * sigma**2, out=dark)
         np.maximum(bright, (half - mean) * sigma**2, out=bright)
-    return tuple(np.clip(line / (np.quantile(line, 0.93) + 1.0), 0, 1.2) for line in (dark, bright))  # type: ignore[return-value]
+    dark, bright = (np.clip(line / (np.quantile(line, 0.93) + 1.0), 0, 1.2) for line in (dark, bright))
+    return dark, bright

@@ -93,11 +93,11 @@ class FoundElements:
     @property
     def background(self) -> Bools:
         """Pixels that are not part of an element, shape (H, W)."""
-        return self.labels == 0
+        return np.asarray(self.labels == 0)
 
     def mask(self, number: int) -> Bools:
         """Return the pixels of an element, shape (H, W). `number` counts from 0."""
-        return self.labels == number + 1
+        return np.asarray(self.labels == number + 1)
 
 
 def find_elements(image: object, *, seed: int = 0) -> FoundElements:

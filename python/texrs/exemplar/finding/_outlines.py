@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -11,6 +13,7 @@ from texrs._typing import Floats
 from texrs.exemplar.finding._contours import Contours, blur
 
 Labels = NDArray[np.int32]
+Number = TypeVar("Number", bound=np.generic)
 
 BAND = 0.16
 """Half width of the band in which an outline may move, as a share of the side of the element."""
@@ -85,7 +88,7 @@ def weigh_words(labels: Labels, contours: Contours) -> Floats:
     return np.asarray(WORDS * blur(ratio[contours.words].astype(np.float32), 1.0), np.float32)
 
 
-def enlarge(values: NDArray[np.generic], shape: tuple[int, int]) -> NDArray[np.generic]:
+def enlarge(values: NDArray[Number], shape: tuple[int, int]) -> NDArray[Number]:
     """Return values at another size, each pixel from the nearest one."""
     at = [((np.arange(n) + 0.5) * m / n).astype(np.intp) for n, m in zip(shape, values.shape, strict=True)]
     return values[np.ix_(*at)]
