@@ -1,8 +1,8 @@
 //! Packing: the disjoint sets of the largest total worth, among many that overlap.
 //!
-//! The problem is NP-hard. Sets are first chosen greedily in order of quality. Then a set replaces
-//! all chosen sets that it overlaps if it is worth more than these together, and sets that are free
-//! are added, until nothing changes.
+//! The problem is NP-hard. Sets are first chosen greedily in order of quality. Then a set replaces all chosen sets
+//! that it overlaps, if it is worth more than these together. Free sets are added. This is repeated until nothing
+//! changes.
 
 use crate::foundation::par::Monitor;
 use crate::kernels::hierarchy::Sets;

@@ -160,7 +160,7 @@ struct Holes<'a> {
     area: &'a [f64],
     near: &'a [Vec<u32>],
     open: &'a [bool],
-    /// Number of the last search that found a region inside the node, or beside it.
+    /// Number of the last search that found a region inside the node, or next to it.
     inside: Vec<u32>,
     beside: Vec<u32>,
     group: Vec<u32>,

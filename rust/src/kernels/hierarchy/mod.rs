@@ -58,7 +58,7 @@ impl Sets {
         self.starts.len() - 1
     }
 
-    /// Returns whether there are no sets.
+    /// Returns whether the list of sets is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -103,7 +103,7 @@ impl Graph<'_> {
         self.area.len()
     }
 
-    /// Returns whether there are no regions.
+    /// Returns whether the image has zero regions.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
     }

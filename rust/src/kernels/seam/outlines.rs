@@ -1,12 +1,12 @@
 //! Outlines of labelled regions as minimum cuts in bands around their first outlines.
 //!
-//! Y. Boykov, G. Funka-Lea, *Graph cuts and efficient N-D image segmentation*, IJCV 70, 2006, for
-//! each region on its own: its deep pixels are inside, far pixels and the deep pixels of other
-//! regions are outside, and the cut between them is the one of least energy.
+//! Y. Boykov, G. Funka-Lea, *Graph cuts and efficient N-D image segmentation*, IJCV 70, 2006, applied to each region
+//! separately. Deep pixels of the region are inside. Far pixels and deep pixels of other regions are outside. The cut
+//! of least energy separates them.
 //!
 //! 1. Measure the distance of each pixel from the first outline.
-//! 2. Cut the band. The energy has the evidence of each pixel, a pull towards the first outline,
-//!    and the price of each pair of pixels that the outline parts.
+//! 2. Cut the band. The energy is the sum of the evidence of pixels, a pull towards the first outline, and the prices
+//!    of pairs of pixels across the outline.
 //! 3. Keep the largest connected part, and fill its holes.
 //! 4. A pixel that several regions claim stays with its first region, or goes to the nearest one.
 
@@ -35,12 +35,12 @@ pub struct Evidence<'a> {
     pub pull: f32,
 }
 
-/// Returns labels with new outlines. 0 is the background; label `i` has a band of `reach[i]` pixels
-/// on both sides of its outline, and stays as it is if that is 0.
+/// Returns labels with new outlines. 0 is the background. The outline of label `i` moves by at most `reach[i]` pixels,
+/// and not at all if that is 0.
 ///
 /// # Errors
-/// Arrays do not fit, a label is out of range, a reach is above 64, or a value is not finite or a
-/// price is negative.
+/// If the arrays have different sizes, a label is out of range, a reach is above 64, a value is not finite, or a price
+/// is negative.
 pub fn refine(
     labels: &[i32],
     shape: [usize; 2],
@@ -241,8 +241,8 @@ impl Band {
     }
 }
 
-/// Returns the number of the connected part of each true pixel, and the sizes of all parts: 0 if
-/// `open` holds for one of its pixels.
+/// Returns the number of the connected part of each true pixel, and the size of each part. The size is 0 if `open` is
+/// true for one of its pixels.
 fn parts(
     flags: &[bool],
     [rows, columns]: [usize; 2],
@@ -280,8 +280,8 @@ fn parts(
     (part, sizes)
 }
 
-/// Returns the distance of each pixel from the nearest one whose flag is `to`, by steps of 1 and
-/// 4/3 (chamfer distance): 0 at those pixels, 0.5 beside them.
+/// Returns the chamfer distance of each pixel from the nearest pixel whose flag is `to`, with steps of 1 and 4/3. It
+/// is 0 at those pixels and 0.5 at their neighbours.
 fn distance(flags: &[bool], [rows, columns]: [usize; 2], to: bool) -> Vec<f32> {
     const DIAGONAL: f32 = 4.0 / 3.0;
     let far = (rows + columns) as f32;
@@ -340,8 +340,8 @@ mod tests {
     use super::*;
     use crate::foundation::par::install;
 
-    /// Returns labels of a square that is `off` pixels too small on each side, and a price that is
-    /// low along the true outline, in an image of 30 x 30 pixels.
+    /// Returns labels of a square in an image of 30 x 30 pixels, and a price. The square is `off` pixels too small on
+    /// each side, and the price is low along the true outline.
     fn square(off: usize) -> (Vec<i32>, Vec<f32>, Vec<i32>) {
         let inside = |p: usize, margin: usize| {
             let range = 8 + margin..22 - margin;

@@ -8,20 +8,20 @@ import numpy as np
 
 from texrs._arrays import as_image, as_rgb, as_seed, to_unit
 from texrs._typing import Bools, Floats, Labels
-from texrs.exemplar.finding._choice import Choice, choose
-from texrs.exemplar.finding._contours import find_contours
-from texrs.exemplar.finding._layout import LAYOUTS, Arrangement, read_layout
-from texrs.exemplar.finding._outlines import enlarge, refine_outlines
-from texrs.exemplar.finding._overlaps import Overlap, find_overlaps
+from texrs.exemplar.element_finder._contour_strength import find_contours
+from texrs.exemplar.element_finder._layout_class import LAYOUTS, Arrangement, read_layout
+from texrs.exemplar.element_finder._outline_cuts import enlarge, refine_outlines
+from texrs.exemplar.element_finder._overlaps import Overlap, find_overlaps
+from texrs.exemplar.element_finder._selection import Choice, choose
 
 WORK = 200, 360
 """Least and largest length of the longer side of the reduced image, in pixels."""
 LEAST = 8
 """Length of the shorter side of the reduced image below which nothing is searched for, in pixels."""
 EMPTY = 0.9
-"""Probability of the layout "none" if there are no candidates at all."""
+"""Probability of the layout "none" if no candidates exist."""
 RIGHT = 0.43, 0.12
-"""Quality at which half of the elements are right, and the spread around it. Fitted on 20 images."""
+"""Quality for a 50 % probability that an element is right, and the spread around it. Fitted on 20 images."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Element:
     at_border : bool
         Whether the border of the image cuts it.
     below : tuple of int
-        Numbers of the elements that lie on this one, if the layout is a heap.
+        Numbers of the elements on top of this one, if the layout is a heap.
 
     """
 
@@ -72,14 +72,14 @@ class FoundElements:
     elements : tuple of Element
         The elements.
     layout : {"separate", "heap", "jointed", "net", "none"}
-        How the elements lie: on a background, in a heap, as cells that joints part, or as the meshes of a net. "none":
-        a person would not outline elements.
+        Arrangement of the elements: on a background, in a heap, as cells between joints, or as the meshes of a net.
+        "none": a person would not outline elements.
     confidence : float
         Probability that the layout is right.
     layouts : dict of str to float
         Probability of each layout.
     overlaps : tuple of Overlap
-        Which element of a heap lies on which.
+        Overlapping pairs of elements of a heap, each with the upper and the lower element.
 
     """
 
@@ -118,7 +118,7 @@ def find_elements(image: object, *, seed: int = 0) -> FoundElements:
     Examples
     --------
     >>> from texrs import samples
-    >>> from texrs.exemplar.finding import find_elements
+    >>> from texrs.exemplar.element_finder import find_elements
     >>> found = find_elements(samples.dots((128, 128)).image)
     >>> found.layout
     'separate'

@@ -10,9 +10,9 @@ from scipy import ndimage
 
 from texrs import _rust
 from texrs._typing import Floats
-from texrs.exemplar.finding._candidates import Candidates, Leaves, make_candidates, make_leaves
-from texrs.exemplar.finding._contours import Contours
-from texrs.exemplar.finding._quality import FLOOR, measure_quality
+from texrs.exemplar.element_finder._candidates import Candidates, Leaves, make_candidates, make_leaves
+from texrs.exemplar.element_finder._contour_strength import Contours
+from texrs.exemplar.element_finder._quality import FLOOR, measure_quality
 
 Values = NDArray[np.float64]
 
@@ -21,9 +21,9 @@ VOICE = 0.2
 ALIKE = 0.12
 """Weight of the likeness in size and shape to the other elements."""
 SIZE = 0.22
-"""What a size that is far from the usual one takes from a quality, at one spread."""
+"""Loss of quality if the size differs from the usual one by one spread."""
 BLEND = 0.1
-"""What an outline that looks alike on both sides takes from a quality, if those of the other elements do not."""
+"""Loss of quality if both sides of an outline look alike, unlike those of other elements."""
 FAR = 1.3
 """Distance from the usual size, in spreads, beyond which the size does not count against a candidate any further."""
 RARE = 0.8
@@ -33,7 +33,7 @@ LARGER = 0.1
 CONVEX = 6
 """Power of the convexity in the value of a choice. On 30 images, 6 picks the best reading of lines most often."""
 STARTS = 6
-"""Number of usual sizes from which the consensus starts. The mean F of drawn images is 0.81 with 1, 0.90 with 6."""
+"""Number of usual sizes to start the consensus with. The mean F of drawn images is 0.81 with 1, 0.90 with 6."""
 OTHERS = 48
 """Number of elements that each candidate is compared with."""
 ROUNDS = 4
@@ -75,7 +75,7 @@ class Choice:
 
 
 def choose(contours: Contours) -> Choice | None:
-    """Return the best choice over all readings of lines, or None if there are no elements."""
+    """Return the best choice over all readings of lines, or None without elements."""
     best = None
     for lines in ("none", "dark", "light"):
         found = choose_reading(contours, lines)
@@ -182,7 +182,7 @@ def measure_value(candidates: Candidates, quality: Values, chosen: NDArray[np.bo
 
 
 def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality: Values, leaves: Leaves) -> Values:
-    """Return what the chosen candidates add to the quality of each: its code words, and the likeness of its shape.
+    """Return the amount that the chosen candidates add to each quality, for its code words and its shape.
 
     Better candidates count more. A candidate itself does not count for or against itself.
     """
@@ -209,9 +209,9 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     say = weight[np.searchsorted(picked, some)] + 0.05
     like = (np.exp(-0.5 * far) * (far > 1e-9)) @ say / say.sum()
     like = like / max(float(np.quantile(like[picked], 0.9)), 1e-6)
-    # A shape like those of the others overrules most of what speaks against a rare colour.
+    # A usual shape overrules most of the evidence against a rare colour.
     mean = np.maximum(mean, 0) + np.minimum(mean, 0) * (1 - RARE * np.minimum(like, 1))
-    # Patches of the background look like what is beside them, more so than the elements do.
+    # Patches of the background look like their surroundings, more so than elements do.
     usual = weighted_median(f["alike"][picked], np.sqrt(f["area"][picked]))
     blend = np.clip((f["alike"] - usual - 0.1) / 0.4, 0, 1)
     return np.asarray(-BLEND * blend + VOICE * np.clip(mean, -1.0, 0.8) + ALIKE * np.clip(like - 0.5, -0.5, 0.5))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 import texrs
 from texrs import samples
 from texrs.errors import InvalidInput
-from texrs.exemplar.finding import FoundElements, find_elements
-from texrs.exemplar.finding._overlaps import find_overlaps
+from texrs.exemplar.element_finder import FoundElements, find_elements
+from texrs.exemplar.element_finder._overlaps import find_overlaps
 
 
 def rate(found: FoundElements, truth: NDArray[np.int32]) -> tuple[float, float]:

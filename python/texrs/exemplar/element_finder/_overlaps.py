@@ -1,4 +1,4 @@
-"""Overlaps: which element of a heap lies on which.
+"""Overlaps: the upper and the lower one of two elements in a heap.
 
 An element that lies on another one keeps its convex outline, and cuts a bay into the outline of the other. The convex
 hull of the lower element therefore enters the upper one, but not the other way round.
@@ -19,7 +19,7 @@ Labels = NDArray[np.int32]
 NEAR = 2.5
 """Largest distance of two elements that touch, in pixels of the reduced image."""
 CLEAR = 0.03
-"""Difference of the shares that hulls enter at which the order is clear, as a share of the smaller element."""
+"""Difference of the overlaps with hulls that makes the order clear, as a share of the smaller element."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Candidates: leaves of a watershed, merged in several orders, and what is measured of every node."""
+"""Candidates: leaves of a watershed that are merged in several orders, and measures of all nodes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs import _rust
 from texrs._typing import Floats
-from texrs.exemplar.finding._contours import Contours, blur
+from texrs.exemplar.element_finder._contour_strength import Contours, blur
 
 TREES = ((1.0, 0.0, False), (1.0, 0.0, True), (1.0, 1.0, True), (0.3, 1.0, True), (0.0, 1.0, False))
 """Orders of merging: weight of contours, weight of colours, and whether small regions are merged earlier."""
@@ -108,7 +108,7 @@ class Candidates:
         return Candidates(starts, self.members[at], features, self.words[which])
 
     def paint(self, leaves: Leaves) -> NDArray[np.int32]:
-        """Return an image in which the pixels of candidate `i` are ``i + 1``. Candidates must be disjoint."""
+        """Return an image with the value ``i + 1`` at the pixels of candidate `i`. Candidates must be disjoint."""
         number = np.zeros(leaves.count, np.int32)
         number[self.members] = np.repeat(np.arange(1, len(self) + 1), np.diff(self.starts))
         return number[leaves.labels]

@@ -1,4 +1,4 @@
-"""Layout: how the elements of an image lie, read from their contact and from what is between them."""
+"""Layout: the arrangement of the elements of an image, from their contact and the gaps between them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from texrs.exemplar.finding._choice import Choice
-from texrs.exemplar.finding._contours import Contours
+from texrs.exemplar.element_finder._contour_strength import Contours
+from texrs.exemplar.element_finder._selection import Choice
 
 Arrangement: TypeAlias = Literal["separate", "heap", "jointed", "net", "none"]
 
@@ -40,10 +40,10 @@ def read_layout(choice: Choice, contours: Contours) -> dict[Arrangement, float]:
 
 
 def measure_cues(choice: Choice, contours: Contours) -> dict[str, float]:
-    """Return what a layout is read from.
+    """Return the cues of the layout.
 
-    These are the contact of the elements, the width of the gaps, the value of the choice, the lightness beside the
-    elements and between them, and shape and contrast of the elements.
+    Contact of the elements, width of the gaps, value of the choice, lightness in and around the gaps, and shape and
+    contrast of the elements.
     """
     labels, f, light = choice.labels, choice.chosen.features, contours.lab[..., 0]
     background, inner = labels == 0, labels > 0

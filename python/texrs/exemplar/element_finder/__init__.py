@@ -4,17 +4,17 @@
 2. *Leaves*: regions of a watershed of the strength.
 3. *Trees*: leaves are merged in several orders. Every node is a candidate, also with its holes filled.
 4. *Quality*: each candidate is rated by its outline and its shape.
-5. *Choice*: the best disjoint set of candidates, for a ladder of sizes and each reading of lines.
+5. *Choice*: the best disjoint set of candidates, among several usual sizes and readings of lines.
 6. *Consensus*: the chosen candidates support those that look like them, and the choice is made again.
 7. *Outlines*: minimum cuts in bands around the first outlines, at the full size.
-8. *Layout*: from the contact of elements and what is between them. In a heap, also which element lies on which.
+8. *Layout*: from the contact of elements and the gaps between them. For heaps, the overlaps are also found.
 """
 
 from __future__ import annotations
 
-from texrs.exemplar.finding._finding import Element, FoundElements, find_elements
-from texrs.exemplar.finding._layout import Arrangement
-from texrs.exemplar.finding._overlaps import Overlap
+from texrs.exemplar.element_finder._finder import Element, FoundElements, find_elements
+from texrs.exemplar.element_finder._layout_class import Arrangement
+from texrs.exemplar.element_finder._overlaps import Overlap
 
 __all__ = ["Arrangement", "Element", "FoundElements", "Overlap", "find_elements"]
 
