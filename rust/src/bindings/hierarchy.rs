@@ -123,9 +123,9 @@ fn sets(starts: &[i64], members: &[u32]) -> Result<Sets> {
     Sets::new(starts, members.to_vec())
 }
 
-/// Returns the measures of sets of regions, one row per set: three sums along the outer border, and three sums of
-/// borders inside. Then follow the areas of the convex hull and of the smallest rectangle, the extent, the contrast,
-/// and the share of the border that looks alike on both sides.
+/// Returns the measures of sets of regions, one row per set. Three sums along the outer border and three sums of
+/// borders inside come first. Then follow the areas of the convex hull and of the smallest rectangle, the extent and
+/// the contrast. The last one is the share of the border that looks alike on both sides.
 #[pyfunction]
 pub(super) fn measure_regions<'py>(
     py: Python<'py>,

@@ -6,7 +6,7 @@
 //!
 //! 1. Measure the distance of each pixel from the first outline.
 //! 2. Cut the band. The energy is the sum of the evidence of pixels, a pull towards the first outline, and the prices
-//!    of pairs of pixels across the outline.
+//!    of pairs across the outline.
 //! 3. Keep the largest connected part, and fill its holes.
 //! 4. A pixel that several regions claim stays with its first region, or goes to the nearest one.
 
@@ -39,8 +39,8 @@ pub struct Evidence<'a> {
 /// and not at all if that is 0.
 ///
 /// # Errors
-/// If the arrays have different sizes, a label is out of range, a reach is above 64, a value is not finite, or a price
-/// is negative.
+/// The sizes of the arrays differ, a label is out of range, a reach exceeds 64, a value is not finite, or a price is
+/// negative.
 pub fn refine(
     labels: &[i32],
     shape: [usize; 2],
