@@ -83,6 +83,7 @@ type Candidates<'py> = (
 
 /// Returns the nodes of several merge trees of regions. A row of `costs` is (arcs, means, small).
 #[pyfunction]
+#[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
 pub(super) fn region_candidates<'py>(
     py: Python<'py>,
     area: PyReadonlyArray1<'py, f64>,

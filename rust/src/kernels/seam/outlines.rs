@@ -39,8 +39,7 @@ pub struct Evidence<'a> {
 /// and not at all if that is 0.
 ///
 /// # Errors
-/// The sizes of the arrays differ, a label is out of range, a reach exceeds 64, a value is not finite, or a price is
-/// negative.
+/// Sizes of arrays differ, a label is out of range, a reach exceeds 64, a value is not finite, or a price is negative.
 pub fn refine(
     labels: &[i32],
     shape: [usize; 2],
@@ -381,7 +380,7 @@ mod tests {
                 if p / 30 % 7 == 0 {
                     0
                 } else {
-                    1 + (p / 30 / 7 * 3 + p % 30 / 10) as i32
+                    1 + p / 30 / 7 * 3 + p % 30 / 10
                 }
             })
             .collect();
