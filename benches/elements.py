@@ -7,7 +7,8 @@ FINDER is design (`Exemplar.segment`), splice (`elements.analyse`), texrs (`find
 
 - image: path relative to TEXTURES. crop: null, or [row, column, rows, columns].
 - layout: accepted classes, the best one first: separate, heap, jointed, net, none. The elements of a net are its meshes.
-- polygons: outlines of the elements as (row, column), pixel centres at integers. Later ones cover earlier ones.
+- polygons: outlines of the elements, rows and columns in turn, pixel centres at integers. Later ones cover earlier
+  ones.
 - ignore: polygons of areas where nothing counts. Elements are cut out of them.
 
 An element is found if its intersection over union (IoU) with a found one is above 0.5. Because labels do not overlap,
@@ -124,9 +125,7 @@ def find(image: NDArray[Any]) -> Found:
 def find_design(image: NDArray[Any]) -> Found:
     """Return the elements of DESIGN, which does not state a layout. Cells of a grid are not elements."""
     found = Exemplar(image).segment()
-    if found.kind != "components":
-        return Found(np.zeros_like(found.elements), ("none",))
-    return Found(found.elements)
+    return Found(found.elements if found.kind == "components" else np.zeros_like(found.elements))
 
 
 def find_splice(image: NDArray[Any]) -> Found:
@@ -158,7 +157,7 @@ def fill(shape: Sequence[int], polygons: list[Any]) -> NDArray[np.int32]:
     """Return the labels of polygons, from 1. Later polygons cover earlier ones."""
     labels = np.zeros(shape, np.int32)
     for i, polygon in enumerate(polygons, 1):
-        labels[polygon2mask(tuple(shape), np.array(polygon))] = i
+        labels[polygon2mask(tuple(shape), np.array(polygon).reshape(-1, 2))] = i
     return labels
 
 
@@ -281,12 +280,14 @@ def write_sheets(pictures: list[Image.Image], folder: Path, name: str) -> None:
 def main(finder: str, cases: Iterator[Case], sheets: Path | None) -> None:
     """Measure a finder and print the tables."""
     run = load_finder(finder)
-    print("| image | elements | found | precision | recall | F | IoU | outline | found layout | true | sure | s | B/px |")
+    print(
+        "| image | elements | found | precision | recall | F | IoU | outline | found layout | true | sure | s | B/px |"
+    )
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     single: list[tuple[float, bool]] = []
     layouts: list[tuple[float, bool]] = []
     means: dict[str, list[tuple[float, ...]]] = {}
-    guessed: list[bool] = []
+    guessed: list[tuple[bool, bool]] = []
     pictures = []
     for case in cases:
         before, began = measure_peak(reset=True), time.process_time()
@@ -307,9 +308,9 @@ def main(finder: str, cases: Iterator[Case], sheets: Path | None) -> None:
             right = {j for _, j, _ in score.pairs}
             single += [(found.confidence[j], j in right) for j in score.counted if j in found.confidence]
         if found.layout:
-            guessed.append(bool(set(found.layout) & set(case.layout)))
+            guessed.append((bool(set(found.layout) & set(case.layout)), case.layout[0] in found.layout))
             if found.sure is not None:
-                layouts.append((found.sure, guessed[-1]))
+                layouts.append((found.sure, guessed[-1][0]))
         sure = "-" if found.sure is None else f"{found.sure:.2f}"
         row += ["/".join(found.layout) or "-", "/".join(case.layout), sure, f"{cost[0]:.2f}", f"{cost[1]:.0f}"]
         print(f"| {case.name} | " + " | ".join(row) + " |", flush=True)
@@ -318,10 +319,13 @@ def main(finder: str, cases: Iterator[Case], sheets: Path | None) -> None:
     for name, rows in means.items():
         values = [f"{v:.2f}" for v in np.mean(rows, axis=0)]
         worst = min(row[2] for row in rows)
-        print(f"| mean of {len(rows)} {name} (least F {worst:.2f}) | | | " + " | ".join(values[:5]) + " | | | | ", end="")
+        print(
+            f"| mean of {len(rows)} {name} (least F {worst:.2f}) | | | " + " | ".join(values[:5]) + " | | | | ", end=""
+        )
         print(" | ".join(values[5:]) + " |")
     if guessed:
-        print(f"\nlayout right on {sum(guessed)} of {len(guessed)} ({np.mean(guessed):.0%})")
+        accepted, best = np.mean(guessed, axis=0)
+        print(f"\nlayout of {len(guessed)}: {accepted:.0%} among the accepted classes, {best:.0%} the best one")
     print_reliability("layouts", layouts)
     print_reliability("single elements", single)
     if sheets is not None:
