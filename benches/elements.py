@@ -219,7 +219,7 @@ def measure_distance(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
     """Return the mean distance of two outlines in pixels, both ways. The border of the image is not an outline."""
     where = ndimage.find_objects((a | b).astype(np.uint8))[0]
     box = tuple(slice(max(s.start - 1, 0), s.stop + 1) for s in where)
-    edges = [find_boundaries(one[box], mode="thick") for one in (a, b)]
+    edges = [find_boundaries(one[box], mode="inner") for one in (a, b)]
     if not all(edge.any() for edge in edges):
         return 0.0
     one, two = (ndimage.distance_transform_edt(~edge) for edge in edges)
@@ -317,12 +317,12 @@ def main(finder: str, cases: Iterator[Case], sheets: Path | None) -> None:
         if sheets is not None:
             pictures.append(draw(case, found, score))
     for name, rows in means.items():
-        values = [f"{v:.2f}" for v in np.mean(rows, axis=0)]
+        texts = [f"{v:.2f}" for v in np.mean(rows, axis=0)]
         worst = min(row[2] for row in rows)
         print(
-            f"| mean of {len(rows)} {name} (least F {worst:.2f}) | | | " + " | ".join(values[:5]) + " | | | | ", end=""
+            f"| mean of {len(rows)} {name} (least F {worst:.2f}) | | | " + " | ".join(texts[:5]) + " | | | | ", end=""
         )
-        print(" | ".join(values[5:]) + " |")
+        print(" | ".join(texts[5:]) + " |")
     if guessed:
         accepted, best = np.mean(guessed, axis=0)
         print(f"\nlayout of {len(guessed)}: {accepted:.0%} among the accepted classes, {best:.0%} the best one")
