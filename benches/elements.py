@@ -12,7 +12,8 @@ FINDER is design (`Exemplar.segment`), splice (`elements.analyse`), texrs (`find
 - ignore: polygons of areas where nothing counts. Elements are cut out of them.
 
 An element is found if its intersection over union (IoU) with a found one is above 0.5. Because labels do not overlap,
-this pairs each with one at most. Elements below 16 pixels, or below 4 % of the median area of the image, do not count.
+this pairs each with one at most. Elements below 16 pixels, or below 4 % of the median area of the image, do not count. At the
+border of the image the limit is 10 %.
 Neither do found ones that are mostly inside ignored areas or such small elements.
 """
 
@@ -43,8 +44,8 @@ from texrs.errors import TexrsError
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from elements_table import print_reliability
 
-SMALL = 16, 0.04
-"""Elements below this number of pixels, or below this share of the median area, do not count."""
+SMALL = 16, 0.04, 0.1
+"""Pixels, and shares of the median area in the image and at its border, below which elements do not count."""
 SAMPLES = {
     "dots": ["separate"],
     "pebbles": ["separate", "heap"],
@@ -148,7 +149,8 @@ def load_finder(name: str) -> Callable[[NDArray[Any]], Found]:
     def run(image: NDArray[Any]) -> Found:
         found = module.find_things(image)
         quality = np.clip(found.quality, 0, 1).tolist()
-        return Found(found.labels, (found.layout,), float(found.confidence), dict(enumerate(quality, 1)))
+        layout = {"cells": "jointed"}.get(found.layout, found.layout)
+        return Found(found.labels, (layout,), float(found.confidence), dict(enumerate(quality, 1)))
 
     return run
 
@@ -203,16 +205,24 @@ def rate(found: NDArray[np.int32], case: Case) -> Score:
     iou = both / np.maximum(area[:, None] + (whole - hidden)[None] - both, 1)
     area[0] = whole[0] = 0
     iou[0] = iou[:, 0] = 0
-    least = max(SMALL[0], SMALL[1] * float(np.median(area[area > 0]))) if area.any() else SMALL[0]
-    counts = area >= least
+    usual = float(np.median(area[area > 0])) if area.any() else 0.0
+    counts = area >= measure_least(labels, usual)
     aside = hidden + both[1:][~counts[1:]].sum(axis=0)
     pairs = [(int(i), int(j), float(iou[i, j])) for i, j in np.argwhere(iou > 0.5) if counts[i]]
-    counted = (whole >= least) & (2 * aside < whole)
+    counted = (whole >= measure_least(found, usual)) & (2 * aside < whole)
     counted[[j for _, j, _ in pairs]] = True
     missed = sorted(set(np.flatnonzero(counts).tolist()) - {i for i, _, _ in pairs})
     seen = np.where(ignored, 0, found)
     away = float(np.mean([measure_distance(labels == i, seen == j) for i, j, _ in pairs])) if pairs else 0.0
     return Score(int(counts.sum()), int(counted.sum()), pairs, away, np.flatnonzero(counted).tolist(), missed)
+
+
+def measure_least(labels: NDArray[np.int32], usual: float) -> NDArray[np.float64]:
+    """Return the area from which on each label counts, where `usual` is the median area of the elements."""
+    least = np.full(int(labels.max()) + 1, max(SMALL[0], SMALL[1] * usual))
+    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        least[side] = max(SMALL[0], SMALL[2] * usual)
+    return least
 
 
 def measure_distance(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
