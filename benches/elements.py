@@ -2,7 +2,7 @@
 
 python benches/elements.py FINDER --textures FOLDER --truth FOLDER [--samples] [--sheets FOLDER]
 
-FINDER is design (`Exemplar.segment`), splice (`elements.analyse`), texrs (`find` below), or a Python file with
+FINDER is design (`Exemplar.segment`), splice (`elements.analyse`), texrs (`exemplar.element_finder`), or a Python file with
 `find_things`. TRUTH contains NAME.json files and layouts.json:
 
 - image: path relative to TEXTURES. crop: null, or [row, column, rows, columns].
@@ -40,6 +40,7 @@ from skimage.segmentation import find_boundaries
 
 from texrs import Exemplar, elements, io, samples
 from texrs.errors import TexrsError
+from texrs.exemplar.element_finder import find_elements
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from elements_table import print_reliability
@@ -119,8 +120,10 @@ class Score:
 
 
 def find(image: NDArray[Any]) -> Found:
-    """Return what the finder of texrs finds."""
-    raise NotImplementedError("texrs: this finder does not exist yet")
+    """Return the elements of `texrs.exemplar.element_finder`."""
+    found = find_elements(image)
+    sure = {i: each.confidence for i, each in enumerate(found.elements, 1)}
+    return Found(found.labels, (found.layout,), found.confidence, sure)
 
 
 def find_design(image: NDArray[Any]) -> Found:
