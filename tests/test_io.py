@@ -213,7 +213,7 @@ def test_npy_layouts(tmp_path):
     with pytest.warns(InputWarning, match="other not used: only the array 'image' is read"):
         assert_array_equal(tio.read(tmp_path / "a.npz"), image)
     np.savez(tmp_path / "a.npz", a=image, b=image)
-    with pytest.raises(FileError, match="single array, or one with the key 'image'; has a, b"):
+    with pytest.raises(FileError, match="single array, or one with the key 'image'; got a, b"):
         tio.read(tmp_path / "a.npz")
     np.save(tmp_path / "nan.npy", np.full((4, 4), np.nan, np.float32))
     assert np.isnan(tio.read(tmp_path / "nan.npy")).all()

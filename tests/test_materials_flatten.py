@@ -127,7 +127,7 @@ def test_no_light_is_endless(dtype: str, space: Any, highest: float) -> None:
     assert np.isfinite(flatten_lighting(lit, space=space)).all()
     if kind.itemsize > 2:
         lit[3, 4] = -1.1e15
-        with pytest.raises(InvalidInput, match=r"image: .*up to 1e\+15.*got 1\.1e\+15"):
+        with pytest.raises(InvalidInput, match=r"image: .*at most 1e\+15.*got 1\.1e\+15"):
             flatten_lighting(lit, space=space)
 
 

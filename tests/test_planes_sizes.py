@@ -102,7 +102,7 @@ def test_a_voice_the_other_way_round_is_outvoted() -> None:
 
 def test_small_pictures_are_doubtful() -> None:
     floor = samples.tilted_discs((56, 56))
-    with pytest.warns(UserWarning, match="too little to measure in more than one way"):
+    with pytest.warns(UserWarning, match="too small for several measurements"):
         scale = measure_known_scale(floor.image, np.ones((56, 56), np.bool_)).scale
     assert scale.shape == (56, 56)
 

@@ -119,7 +119,7 @@ def test_no_value_in_a_float_picture(here: Path, capsys: pytest.CaptureFixture[s
     values[10:20, 10:20] = np.nan
     tifffile.imwrite("nan.tif", values)
     assert main(["tile", "nan.tif", "-o", "tiled.tif"]) == 2
-    assert "nan.tif: 100 of 9216 values are NaN" in capsys.readouterr().err
+    assert "nan.tif: must be finite, but 100 of 9216 values are NaN" in capsys.readouterr().err
     assert not Path("tiled.tif").exists()
 
 

@@ -205,7 +205,7 @@ def test_one_known_pixel_is_enough() -> None:
         (FLOOR, np.ones((5, 5), bool), r"^known: must have shape \(60, 80\), got \(5, 5\)$"),
         (FLOOR, np.ones(FLOOR.shape), r"^known: must be bool or integers, got dtype float64$"),
         (-FLOOR, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 scales are outside"),
-        (FLOOR * np.nan, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 values are NaN"),
+        (FLOOR * np.nan, np.eye(60, 80, dtype=bool), r"^scale: must be finite, but 60 of 4800 values are NaN"),
     ],
 )
 def test_extend_refuses(scale: np.ndarray, known: np.ndarray, message: str) -> None:

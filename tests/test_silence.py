@@ -141,7 +141,8 @@ def test_masks_that_mark_nothing_are_refused(here: Path, capsys: Capture, comman
     if command == "database":
         words = ["database", "db", "add", "in.png", "--mask", "empty.png"]
     elif command == "scale-map":
-        words = [word for word in words if word not in ("--slant", "20")]
+        # A hole is only used if the map is measured.
+        words = [word for word in words if word not in ("--slant", "20")] + ["--auto"] * (name == "hole")
     assert main(words) == 2, capsys.readouterr().err
     assert f"{empty}: marks nothing" in capsys.readouterr().err
 

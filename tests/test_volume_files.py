@@ -43,7 +43,9 @@ def test_bool_is_written_as_0_and_255_and_halves_not_at_all(tmp_path, suffix):
     mask = make.picture((3, 4, 5), bool)
     tio.write_volume(tmp_path / f"mask{suffix}", mask)
     assert_array_equal(tio.read_volume(tmp_path / f"mask{suffix}"), mask * np.uint8(255))
-    with pytest.raises(InvalidInput, match=r"cannot hold volumes of float16 with 1 channel; \.npy, \.npz, \.tif"):
+    with pytest.raises(
+        InvalidInput, match=r"cannot store volumes of float16 with 1 channel; use one of \.npy, \.npz, \.tif"
+    ):
         tio.write_volume(tmp_path / f"half{suffix}", mask.astype(np.float16))
 
 

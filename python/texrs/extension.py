@@ -70,7 +70,8 @@ def extend(
         such as the sky above a floor continues, but objects on the plane do not. Several planes, such as a floor and a
         wall, continue separately up to the line where they meet. Only one of them may lack a ground.
     boundary_width : int
-        Width in pixels of the band at the border that may change to hide it, 0 to 64. Default: 0.
+        Width of the band along the photograph's border that may change to hide the border, in pixels, 0 to 64.
+        Default: 0.
     screening : float, optional
         Weight of the original values in the colour correction of the added pixels, as in `texrs.inpaint`. None or 0:
         no correction. Default: 0.1.
@@ -106,8 +107,8 @@ def extend(
         - ``screening``: Weight of the values in the colour correction.
         - ``match_lighting``: Whether added pixels follow gradual changes of light.
         - ``seed``: The seed.
-        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in the
-          image.
+        - ``planes``: For each plane: ``plane`` with its slant, tilt and angle of view, and whether it was ``found`` in
+          the image.
         - ``ground``: For each plane, the share of the image where it is visible.
 
     Raises

@@ -50,7 +50,7 @@ LEAST_EDGE = 0.002
 NET = 0.2
 """Minimum lightness contrast (0 to 1) of a net to its openings if these are evenly spaced.
 
-Half of it is enough otherwise.
+Half of this contrast is enough if the openings are not evenly spaced.
 """
 EVEN = 0.15
 """Maximum standard deviation of nearest distances, relative to their mean, for even spacing."""

@@ -98,7 +98,7 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     free = np.pad(mask & ~long[lines], margin, mode="symmetric")
     distance = ndimage.distance_transform_edt(free)[margin:-margin, margin:-margin]
     distance = ndimage.gaussian_filter(distance.astype(np.float32), 1.0)
-    # Use logarithms, so that necks are compared with the relative width of the parts on both sides.
+    # Use logarithms, so that the width of a neck is measured relative to the parts on both sides.
     height = log_single(np.maximum(distance, 0.5))
     tops = local_maxima(reconstruct(height - np.float32(np.log(NECK)), height)) & mask
     seeds, count = ndimage.label(tops, SQUARE)

@@ -179,7 +179,8 @@ class Material(Exports):
         path : path_like, or a list of path_like
             Folder, list of files of one folder, or EXR file with several layers.
         roles : mapping of str to Role or str, optional
-            Roles by file name, with or without the suffix, or by layer name. Default: None, which uses the names.
+            Roles by file name, with or without the suffix, or by layer name. Default: None, which
+            derives the roles from the names.
         axes : int
             Number of spatial axes: 2 for images, 3 for volumes. Default: 2.
 

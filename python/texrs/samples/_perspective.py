@@ -83,8 +83,8 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     Returns
     -------
     Sample
-        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the image of the brick's centroid
-        on the plane.
+        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the brick's centroid on the
+        plane, projected into the image.
 
     Raises
     ------

@@ -85,9 +85,9 @@ def turn_vectors(
 ) -> Array:
     """Return vectors (..., C), rotated by Jacobians (..., A, A), in their own dtype.
 
-    A surface h(S(p)) has the slope J^T grad h. Slopes therefore turn with the transposed Jacobian. Normals do so too,
-    and then get unit length. A step v in the exemplar appears as J^-1 v, and keeps its length. The z of normals does
-    not change in an image. In a volume it is the component along the planes.
+    A surface h(S(p)) has the slope J^T grad h. Slopes therefore turn with the transposed Jacobian. Normals turn in
+    the same way, and are then normalised. A step v in the exemplar appears as J^-1 v, and keeps its length. The z of
+    normals does not change in an image. In a volume it is the component along the planes.
 
     Parameters
     ----------

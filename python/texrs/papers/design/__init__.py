@@ -360,7 +360,7 @@ def design_variants(
     Returns
     -------
     iterator of Synthesis
-        One result for each seed, with the same attributes as the result of `design`.
+        One result for each seed. Stages and report are as in `design`.
 
     Raises
     ------

@@ -43,9 +43,9 @@ class DeformationOptions:
         Growth rate of the logistic map (lambda in Eq. 2), 0 to 2. Below about 1.4 the sequence is periodic. Default:
         2.
     u : int
-        Divisor of a value h of the logistic map, 1 to 256. The operation is mod(mod(h, u), v). With
-        ``method="paper"``, the extent is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent comes
-        from another value of the map. Default: 10.
+        Divisor u in mod(mod(h, u), v), 1 to 256. This number selects the operation; h is a value of the logistic map.
+        With ``method="paper"``, the extent is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent
+        comes from another value of the map. Default: 10.
     v : int
         Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order. Default:
         4.

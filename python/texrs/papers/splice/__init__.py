@@ -181,8 +181,8 @@ def splice(
         found.
     use_nets : bool, optional
         If True, a connected texture is composed of its knots and the lines between them, also if it has cells. If
-        False, its figure is bent. Default: True without cells, if ``use_cells`` is not given and a reliable layout has
-        six knots or more.
+        False, its figure is bent. Default: True if the texture has no cells and a reliable layout of at least
+        six knots, and ``use_cells`` is not given.
     allow_rotation : bool, optional
         If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
     refine : bool
@@ -390,10 +390,10 @@ def self_splice(
         column], ...]}`` lists new places. A name without options is a step with its defaults. The report's "edit"
         lists the steps. Default: the layout is not changed.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 along each axis. The texture is resized before the steps. A larger
-        result continues the texture's own layout, as in a splice with itself. A smaller result is the middle of the
-        texture. The steps use the element numbers of the report's "elements", which lists their places before the
-        steps. Default: the size of the image of ``elements``.
+        Size of the result, in pixels, at least 16 along each axis. Before the steps, the texture is continued to the
+        larger size, or cropped. A larger result continues the texture's own layout, as in a splice with itself. A
+        smaller result is the middle of the texture. The steps use the element numbers of the report's "elements",
+        which lists their places before the steps. Default: the size of the image of ``elements``.
     seed : int
         Seed of all random choices, 0 to 2^64 - 1. They are random steps, elements that enter over a border, patches in
         holes, and the noise of the refinement. Default: 0.

@@ -249,7 +249,10 @@ def find_directions(entry: ElementAnalysis) -> tuple[float, ...]:
 
 
 def _measure_gain(a: ElementAnalysis, distances: Points) -> float:
-    """Return the factor, at least 1, that gives disjoint elements room in a layout with these nearest ``distances``."""
+    """Return the scale factor, at least 1, that makes most disjoint elements fit into a layout.
+
+    The nearest-neighbour distances of the layout are ``distances``.
+    """
     parts = split_foreground(a)
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
     if not len(area):

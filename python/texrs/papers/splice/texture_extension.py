@@ -55,7 +55,7 @@ class Extension:
     points : (n, 2) float64
         Elements that may be moved, in output coordinates.
     element : (n) int
-        Number of the texture's element that each point is a copy of.
+        Index, from 0, of the element in the texture that each point copies.
     instance : (H, W) int32
         Element of each pixel in a disjoint foreground, as an index of ``points`` counted from 1, and 0 for other
         pixels.

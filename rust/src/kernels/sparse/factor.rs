@@ -10,7 +10,7 @@ use crate::foundation::par::{self, Monitor};
 
 const WHAT: &str = "the factor of the matrix";
 
-/// The numbers of consecutive blocks.
+/// Entries of the factor in consecutive blocks.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Range of the blocks.
