@@ -12,7 +12,7 @@ use crate::{Error, Result};
 
 /// Number of rows of a task.
 const ROWS: usize = 32;
-/// Labels are padded to a multiple of this number, so that loops over them are vectors.
+/// The number of labels is padded to a multiple of this number, so that the compiler vectorises loops over labels.
 const LANES: usize = 8;
 /// Maximum number of labels.
 pub const MOST: usize = 64;
@@ -24,7 +24,7 @@ const RARE: f32 = 0.02;
 /// the standard deviation of the window, in pixels.
 ///
 /// # Errors
-/// The shape does not fit, or a label, the count or `sigma` is out of range.
+/// The size of `labels` does not match the shape, or a label, the count or `sigma` is out of range.
 pub fn strength(
     labels: &[u8],
     shape: [usize; 2],
@@ -81,7 +81,7 @@ fn gaussian(sigma: f64) -> Vec<f32> {
     raw.iter().map(|w| (w / total) as f32).collect()
 }
 
-/// Returns the index of a value that may be beyond the ends of a mirrored axis.
+/// Maps an index that may be beyond the ends of an axis into the axis, by mirroring.
 fn mirror(place: isize, count: usize) -> usize {
     let n = count as isize;
     let at = place.rem_euclid(2 * n);
@@ -96,19 +96,19 @@ struct Window<'a> {
 }
 
 impl Window<'_> {
-    /// Fills rows of the result from row `first` on.
+    /// Writes the strength of some rows, from row `first` on.
     fn fill(&self, first: usize, out: &mut [f32], sigma: f32) {
         let [_, columns] = self.shape;
         let width = columns * self.lanes;
         let (count, reach) = (out.len() / columns, self.weights.len() - 1);
-        // Histograms along rows: as many rows above and below as the window needs, and one more.
+        // Histograms summed along rows. The window needs `reach` more rows on each side, and the strength one more.
         let mut along = vec![0.0f32; (count + 2 * reach + 2) * width];
         for (i, row) in along.chunks_exact_mut(width).enumerate() {
             self.smooth_row(first as isize + i as isize - reach as isize - 1, row);
         }
         let row = |i: usize| &along[i * width..][..width];
         let mut histograms: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; width]);
-        // The histograms of three consecutive rows are in turns in the three buffers.
+        // The three buffers contain the histograms of the last three rows, and each new row replaces the oldest.
         for i in 0..count + 2 {
             let sums = &mut histograms[i % 3];
             scale(sums, row(i + reach), self.weights[0]);
@@ -123,7 +123,7 @@ impl Window<'_> {
         }
     }
 
-    /// Sums the weights of each label along a row, which may be beyond the border.
+    /// Sums the weights of each label along a row. A row beyond the border is mirrored.
     fn smooth_row(&self, row: isize, out: &mut [f32]) {
         let [rows, columns] = self.shape;
         let labels = &self.labels[mirror(row, rows) * columns..][..columns];

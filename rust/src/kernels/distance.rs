@@ -133,11 +133,11 @@ fn squares(mine: &[bool], [rows, columns]: [usize; 2], mark: bool) -> Vec<i64> {
     along
 }
 
-/// The parabolas of a row that are lowest somewhere.
+/// The lower envelope of the parabolas of a row.
 #[derive(Default)]
 struct Envelope {
     heights: Vec<i64>,
-    /// The vertex of each parabola, and the first position where it is lowest.
+    /// The vertex of each parabola in the envelope, and the first position where it is the lowest.
     parts: Vec<(i64, i64)>,
 }
 

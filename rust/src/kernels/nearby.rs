@@ -13,9 +13,9 @@ use crate::{Error, Result};
 /// Number of points of a task.
 const CHUNK: usize = 4096;
 
-/// Returns a sum of the values of all points for each point (row, column). The weight of a value is
-/// the product of `window[k]` for the distance k in rows and the same for columns. Distances beyond
-/// the window have weight 0.
+/// Returns the weighted sum of the values of all points at each point (row, column). The weight of a value is the
+/// product of `window[k]` for the distance k in rows and the same for columns. Distances beyond the window have weight
+/// 0.
 ///
 /// # Errors
 /// `points` and `values` differ in number, a point is outside the image, the number of pixels

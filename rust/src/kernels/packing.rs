@@ -1,4 +1,4 @@
-//! Packing: the disjoint sets of the largest total worth, among many that overlap.
+//! Packing: the choice of disjoint sets with the largest total worth, among many sets that overlap.
 //!
 //! The problem is NP-hard. Sets are first chosen greedily in order of quality. Then a set replaces all chosen sets
 //! that it overlaps, if it is worth more than these together. Free sets are added. This is repeated until nothing
@@ -8,14 +8,14 @@ use crate::foundation::par::Monitor;
 use crate::kernels::hierarchy::Sets;
 use crate::{Error, Result};
 
-/// No set.
+/// Value for a region that no chosen set contains.
 const NONE: u32 = u32::MAX;
 
-/// Returns which sets are chosen. Sets with a worth of 0 or less, or NaN, are never chosen. At most
-/// `rounds` rounds of exchanges are made.
+/// Returns a flag for each set: whether it is chosen. Sets with a worth of 0 or less, or NaN, are never chosen. At
+/// most `rounds` rounds of exchanges are made.
 ///
 /// # Errors
-/// The numbers of sets differ.
+/// The number of values differs from the number of sets.
 pub fn choose(
     sets: &Sets,
     worth: &[f64],

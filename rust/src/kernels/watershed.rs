@@ -1,4 +1,4 @@
-//! Watersheds: regions of an image around its local minima, and what is between them.
+//! Watersheds: regions of an image around its local minima, and the borders between them.
 //!
 //! F. Meyer, *Topographic distance and watershed lines*, Signal Processing 38, 1994, by flooding
 //! from the minima in order of height, without lines between regions. Each pixel has four
@@ -12,16 +12,16 @@ use crate::{Error, Result};
 
 /// Number of levels that heights are rounded to.
 const LEVELS: usize = 4096;
-/// No pixel, and no region.
+/// Value for no pixel and for no region.
 const NONE: u32 = u32::MAX;
 /// Number of directions of [`Regions::extremes`].
 pub const DIRECTIONS: usize = 32;
 
-/// Returns the region of each pixel and the number of regions. A region begins where a pixel is the
-/// least within `reach` rows and columns.
+/// Returns the region of each pixel and the number of regions. A region begins at each pixel that is the lowest within
+/// `reach` rows and columns. Adjacent pixels of this kind begin the same region.
 ///
 /// # Errors
-/// The shape does not fit, or a height is not finite.
+/// The size of `height` does not match the shape, or a height is not finite.
 pub fn flood(
     height: &[f32],
     shape: [usize; 2],
@@ -43,7 +43,7 @@ pub fn flood(
     let low = least_nearby(height, shape, reach);
     let minima: Vec<bool> = height.iter().zip(&low).map(|(a, b)| a == b).collect();
     let (mut label, count) = components(&minima, shape);
-    // Flood. A pixel is queued by the first region that reaches it, at the level of the water.
+    // Flood. The first region that reaches a pixel adds it to the queue, at the level of the water.
     let (least, most) = height
         .iter()
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| {
@@ -135,7 +135,7 @@ fn components(flags: &[bool], shape: [usize; 2]) -> (Vec<u32>, usize) {
     (label, count as usize)
 }
 
-/// A queue by level, first in, first out within a level.
+/// A queue with levels. Within a level, the pixel that was added first is taken first.
 struct Levels {
     first: Vec<u32>,
     last: Vec<u32>,
@@ -181,8 +181,8 @@ pub struct Regions {
     /// Length of the border of each pair in pixel sides, sum of the strength along it, and length
     /// with a strength below the threshold.
     pub arcs: Vec<[f64; 3]>,
-    /// For each region and each of [`DIRECTIONS`], counted from the second axis towards the first,
-    /// the pixel (row, column) that lies farthest in the direction.
+    /// For each region and each of [`DIRECTIONS`], the pixel (row, column) that is farthest in this direction.
+    /// Directions are counted from the second axis towards the first.
     pub extremes: Vec<[[f32; 2]; DIRECTIONS]>,
 }
 
@@ -195,11 +195,10 @@ pub fn directions() -> [[f64; 2]; DIRECTIONS] {
     })
 }
 
-/// Returns the adjacency of `count` regions. The strength of a pair of pixels is the larger one of
-/// its two values.
+/// Returns the adjacency of `count` regions. The strength between two pixels is the larger of their strengths.
 ///
 /// # Errors
-/// Shapes do not fit, or a region is out of range.
+/// The sizes of the arrays do not match the shape, or a region is out of range.
 pub fn adjacency(
     label: &[u32],
     strength: &[f32],

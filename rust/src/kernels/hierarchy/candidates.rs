@@ -1,4 +1,4 @@
-//! Candidates: the nodes of several merge trees, each once, also with their holes filled.
+//! Candidates: the nodes of several merge trees without duplicates, and the same nodes with their holes filled.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,11 @@ use crate::foundation::hash::Noise;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Share of a node's area that its holes may have together.
+/// Maximum area of one hole that is filled, relative to the area of the node.
 const HOLES: f64 = 0.6;
 
-/// Candidates, and the strength of the border between the two parts of each, or 0.
+/// Candidates, and the strength of the border between the two parts of each candidate, or 0 for single regions and
+/// filled nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Candidates {
     /// The regions of each candidate, in order.
@@ -20,11 +21,11 @@ pub struct Candidates {
     pub seam: Vec<f64>,
 }
 
-/// Returns all nodes of the trees of all costs with an area from `least` to `most`. `open` marks
-/// regions that are not part of a hole, as those at the border of the image.
+/// Returns all nodes of the trees of all costs with an area from `least` to `most` pixels. `open` marks regions that
+/// cannot be part of a hole, such as regions at the border of the image.
 ///
 /// # Errors
-/// Arrays do not fit.
+/// The sizes of the arrays do not match.
 pub fn candidates(
     graph: &Graph<'_>,
     costs: &[Cost],
@@ -92,7 +93,8 @@ struct Nodes {
 
 impl Nodes {
     fn new(tree: &Tree, regions: usize) -> Self {
-        // Later nodes are above earlier ones: visit from the last, parts below it.
+        // A node comes after its parts. Therefore visit the nodes from the last to the first, and the parts below each
+        // node.
         let total = regions + tree.parts.len();
         let mut below = vec![false; total];
         for part in tree.parts.iter().flatten() {
@@ -130,7 +132,8 @@ impl Nodes {
     }
 }
 
-/// The candidates found, each once. Sets are told apart by the sum of 128 random bits a region.
+/// The candidates found, without duplicates. A set is identified by the sum of the random keys (128 bits) of its
+/// regions.
 struct Found {
     keys: Vec<u128>,
     seen: HashMap<u128, usize>,

@@ -23,23 +23,22 @@ pub struct Values<'a, const A: usize> {
     pub extremes: &'a [[[f32; 2]; DIRECTIONS]],
 }
 
-/// What is measured of a set.
+/// Measurements of a set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures<const A: usize> {
     /// Sums of the values of the set's border.
     pub outer: [f64; A],
     /// Sums of the values of borders between regions of the set.
     pub inner: [f64; A],
-    /// Area of the convex hull, of whole pixels.
+    /// Area of the convex hull of the set, in pixels. The hull encloses whole pixels, not only their centres.
     pub hull: f64,
-    /// Area of the smallest rectangle around the set, of 16 orientations.
+    /// Area of the smallest rectangle around the set, among rectangles in 16 orientations.
     pub rectangle: f64,
-    /// Half of the smallest perimeter along the axes that a set of this extent can have.
+    /// Sum of the height and the width of the set, in pixels.
     pub extent: f64,
-    /// Distance of the histograms of the set and of its neighbours, 0 to 1: the mean along the
-    /// border.
+    /// Distance between the histograms of the set and of the neighbours, 0 to 1, averaged along the border.
     pub contrast: f64,
-    /// Share of the border whose neighbour has a distance below [`ALIKE`].
+    /// Share of the border where this distance is below [`ALIKE`].
     pub alike: f64,
 }
 
@@ -49,7 +48,7 @@ const ALIKE: f64 = 0.35;
 /// Measures each set.
 ///
 /// # Errors
-/// Arrays do not fit, or a set has a member without values.
+/// The sizes of the arrays do not match, or a set has a member without values.
 pub fn measure<const A: usize>(
     sets: &Sets,
     values: &Values<'_, A>,
@@ -78,7 +77,7 @@ pub fn measure<const A: usize>(
         ));
     }
     monitor.check()?;
-    // The borders of each region: the other region and the index of the pair.
+    // The borders of each region: the region on the other side, and the index of the pair.
     let mut near: Vec<Vec<[u32; 2]>> = vec![Vec::new(); n];
     for (k, &[p, q]) in values.pairs.iter().enumerate() {
         near[p as usize].push([q, k as u32]);
@@ -162,7 +161,7 @@ impl Work {
             for &[q, k] in &near[i as usize] {
                 let arc = &values.arcs[k as usize];
                 if self.inside[q as usize] == self.search {
-                    // Each inner border is met from both sides.
+                    // Each inner border is visited twice, once from each side.
                     (0..A).for_each(|a| inner[a] += 0.5 * arc[a]);
                     continue;
                 }

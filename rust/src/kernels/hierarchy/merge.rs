@@ -6,28 +6,27 @@ use std::collections::{BTreeMap, BinaryHeap};
 use super::Graph;
 use crate::foundation::libm::pow;
 
-/// What it costs to merge two regions: the mean strength along their border and the distance of
-/// their mean values, each with a weight.
+/// Cost of merging two regions: the mean strength along their border and the distance of their mean values, each with
+/// a weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Weight of the mean strength.
     pub arcs: f64,
     /// Weight of the distance of the mean values.
     pub means: f64,
-    /// Area below which a region is cheaper to merge, or 0.
+    /// Area in pixels below which a region is cheaper to merge, or 0.
     pub small: f64,
 }
 
-/// Power of the area of the smaller region in a cost: a region of a tenth of the area costs 30 %
-/// less.
+/// Exponent of the area of the smaller region in a cost. A ten times smaller area reduces the cost by 30 %.
 const POWER: f64 = 0.15;
 
-/// A merge tree. Node `i` below the number of regions is a region; each later node has two parts.
+/// A merge tree. Nodes below the number of regions are the regions. Each later node has two parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
     /// The two parts of each later node.
     pub parts: Vec<[u32; 2]>,
-    /// Mean strength of the border between the parts, less if one of them is small.
+    /// Mean strength of the border between the two parts. It is reduced if one of them is small.
     pub seam: Vec<f64>,
     /// Number of pixels of each node, regions first.
     pub area: Vec<f64>,
@@ -51,7 +50,7 @@ impl PartialOrd for Offer {
     }
 }
 impl Ord for Offer {
-    /// The cheapest offer is the greatest, then the one of the lowest indices.
+    /// The cheapest offer is the greatest, so that the heap returns it first. Ties go to the lowest indices.
     fn cmp(&self, other: &Self) -> Ordering {
         other
             .cost

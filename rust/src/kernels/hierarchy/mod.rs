@@ -1,4 +1,4 @@
-//! Hierarchies of regions: neighbouring regions merged two by two, in order of a cost.
+//! Hierarchies of regions: pairs of neighbouring regions are merged in order of a cost.
 //!
 //! | part | content |
 //! |---|---|
@@ -32,7 +32,7 @@ impl Sets {
     /// Returns sets from the starts of all sets and the end of the last one, and all members.
     ///
     /// # Errors
-    /// The starts do not begin at 0, fall, or do not end at the number of members.
+    /// The starts do not begin at 0, decrease, or do not end at the number of members.
     pub fn new(starts: Vec<usize>, members: Vec<u32>) -> Result<Self> {
         let sound = starts.first() == Some(&0)
             && starts.last() == Some(&members.len())
@@ -108,7 +108,7 @@ impl Graph<'_> {
         self.area.is_empty()
     }
 
-    /// Returns an error if arrays do not fit.
+    /// Returns an error if the sizes of the arrays do not match.
     pub(crate) fn check(&self) -> Result<()> {
         let n = self.len();
         if self.mean.len() != n {
@@ -139,7 +139,7 @@ impl Graph<'_> {
     }
 }
 
-/// Returns an error if a pair is not of two different regions below `count`.
+/// Returns an error if a pair does not consist of two different regions with numbers below `count`.
 pub(crate) fn check_pairs(pairs: &[[u32; 2]], count: usize) -> Result<()> {
     match pairs
         .iter()

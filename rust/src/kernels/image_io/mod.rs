@@ -18,7 +18,7 @@ use image::{ColorType, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError
 
 use crate::{Error, Result};
 
-/// Number of bytes that a decoded image may have for each pixel of the limit: four floats.
+/// Maximum number of bytes of a decoded image for each pixel of the limit: four floats.
 pub const BYTES_PER_PIXEL: u64 = 16;
 
 /// Memory in bytes that a PNG decoder may use in addition to its rows, for colour profiles and text.
@@ -248,8 +248,8 @@ impl Budget<'_> {
         Ok(())
     }
 
-    /// Returns an empty vector with memory for `bytes`. Call it before a decoder allocates: that would end the process
-    /// if memory is short, and this returns an error. The vector can be dropped at once.
+    /// Returns an empty vector with memory for `bytes`. Call it before a decoder allocates memory: if memory is short,
+    /// this function returns an error, but the decoder would end the process. The vector can be dropped at once.
     fn memory(&self, bytes: u64) -> Result<Vec<u8>> {
         let short = || Error::Limit {
             what: self.name.to_owned(),

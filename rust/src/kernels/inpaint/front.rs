@@ -85,7 +85,7 @@ impl Front {
         corner(&self.grid, self.patch, hole, share)
     }
 
-    /// Finds the best holes of the blocks in a rectangle again.
+    /// Updates the best holes of the blocks in a rectangle.
     fn look(&mut self, start: [usize; 2], extent: [usize; 2], known: &[bool]) {
         let [height, width] = self.grid.shape();
         let across = width.div_ceil(BLOCK);

@@ -107,8 +107,8 @@ impl Window {
         }
     }
 
-    /// Returns the cost of cutting a match in and the pixels that take it, or `None` if it costs
-    /// more than `bound`.
+    /// Returns the cost of cutting in a match, and a flag for each pixel: whether it takes the match. The result is
+    /// `None` if the cost exceeds `bound`.
     pub(super) fn cut(
         &self,
         index: &Index,

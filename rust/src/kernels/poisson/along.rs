@@ -12,7 +12,7 @@
 use super::Edge;
 use crate::foundation::simd::wide_fn;
 
-/// Weight of a neighbour below which it is omitted, relative to the pixel.
+/// Weight below which a neighbour is omitted, relative to the weight of the pixel.
 const NOTHING: f64 = 1.0 / (1 << 28) as f64;
 
 /// The inverse of a product of systems along a row.
@@ -66,8 +66,8 @@ impl Inverse {
         }
     }
 
-    /// Fills a row of all channels by `fill`, which gets the old row, and replaces it by the
-    /// solution.
+    /// Solves the systems of all channels of a row. `fill` gets the old row and writes the right-hand side; the
+    /// solution then replaces the row.
     pub(super) fn apply(
         &self,
         row: &mut [f32],

@@ -59,7 +59,7 @@ pub(super) struct Systems {
     pub(super) ends: [Option<Vec<f64>>; 2],
     /// Number of times that the systems have been squared.
     pub(super) times: usize,
-    /// Systems with a smaller shift are too ill-conditioned for `f32`.
+    /// Shift below which a system is too ill-conditioned for `f32`.
     stiff: f64,
 }
 

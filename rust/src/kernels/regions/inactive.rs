@@ -87,7 +87,8 @@ wide_fn! {
     /// two other edges are both marked are ignored.
     fn bound<const WITNESS: bool>(rows: [&[f32]; 3], stride: usize, out: &mut [f32]) {
         let n = stride - 2;
-        // The edge weights of one row in one direction, from the first pixel or from a pixel next to it.
+        // Returns the edge weights of one row in one direction, starting at the first pixel, or at the pixel before or
+        // after it.
         let line = |row: usize, direction: usize, shift: usize| {
             &rows[row][direction * stride + shift..][..n]
         };

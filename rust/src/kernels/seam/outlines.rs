@@ -21,17 +21,17 @@ use crate::{Error, Result};
 const UNIT: f32 = 65536.0;
 /// Capacity that is never cut.
 const FIXED: i32 = 1 << 28;
-/// Largest evidence and price that count.
+/// Maximum evidence and price. Larger values are clipped.
 const MOST: f32 = 64.0;
 
-/// What outlines depend on.
+/// Data that determine the new outlines.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
     /// Evidence that a pixel is inside (positive) or outside (negative) of any region.
     pub inside: &'a [f32],
     /// Price of an outline that passes a pixel, at least 0.
     pub price: &'a [f32],
-    /// Evidence at the distance of the whole band from the first outline.
+    /// Evidence for the first outline: a pixel at distance d, positive inside, has the evidence `pull * d / reach`.
     pub pull: f32,
 }
 
@@ -78,7 +78,8 @@ pub fn refine(
         };
         Band::new(labels, shape, area, i as i32, reach[i]).cut(evidence, monitor)
     });
-    // Share the claims out, in the order of labels.
+    // If several regions claim a pixel, assign it to its first region, or else to the nearest region. Ties go to the
+    // lowest label.
     let mut out = vec![0i32; labels.len()];
     let mut best = vec![f32::NEG_INFINITY; labels.len()];
     for (i, claims) in claims.into_iter().enumerate() {
@@ -121,7 +122,7 @@ struct Band {
     reach: u8,
     /// Distance of each pixel from the first outline, positive inside.
     depth: Vec<f32>,
-    /// Pixels deep in another region.
+    /// Flags of the pixels deep in another region.
     other: Vec<bool>,
 }
 
@@ -150,7 +151,7 @@ impl Band {
         }
         let (inner, outer) = (distance(&own, shape, false), distance(&own, shape, true));
         let depth: Vec<f32> = inner.iter().zip(&outer).map(|(i, o)| i - o).collect();
-        // A neighbour keeps what lies deeper in it than half of the band.
+        // Pixels of other regions that are deeper than half of the band stay in these regions.
         let inside = distance(&alien, shape, false);
         let other = inside.iter().map(|&d| d > 0.5 * f32::from(reach)).collect();
         Self {
@@ -174,7 +175,7 @@ impl Band {
             let mut terminal = Vec::with_capacity(inside.len());
             let mut price = Vec::with_capacity(inside.len());
             let deepest = self.depth.iter().copied().fold(0.0, f32::max);
-            // A region that is thinner than the band keeps its core.
+            // If the region is thinner than the band, keep its inner part.
             let core = reach.min(0.7 * deepest);
             for (i, &depth) in self.depth.iter().enumerate() {
                 let p = place(i);
@@ -232,7 +233,8 @@ impl Band {
         };
         let holes = self::parts(&outside, self.shape, edge);
         for (flag, &part) in inside.iter_mut().zip(&holes.0) {
-            // A part that meets the edge has no size.
+            // Parts that touch the edge of the window, or pixels deep in another region, have size 0. They are not
+            // holes.
             if part != u32::MAX && holes.1[part as usize] > 0 {
                 *flag = true;
             }

@@ -5,9 +5,9 @@ use super::grid::{AXES, Grid, Item, Links};
 use crate::Result;
 use crate::foundation::memory;
 
-/// A level is wide if it contains more than one in this number of unknowns.
+/// A level is wide if it contains more than 1 / `MANY` of the unknowns of the part.
 const MANY: usize = 4;
-/// An unknown is a hub if it is coupled to this multiple of the average number of others.
+/// An unknown is a hub if it is coupled to more than `HUB` times as many unknowns as the average.
 const HUB: usize = 4;
 
 /// Result of the division of a part.

@@ -5,10 +5,9 @@
 //! 10(2), 1973. The unknowns on both sides of a separator are not coupled, so elimination does not
 //! fill in entries between them. The separator comes last.
 //!
-//! Unknowns of a grid are divided along its lines, straight or diagonal. Suppose that each
-//! unknown is coupled to the unknowns within k steps. Then a diagonal separator encloses twice as
-//! much as a straight separator of the same size. Other unknowns are divided along the levels of a
-//! breadth-first search (George and Liu's automatic nested dissection).
+//! Unknowns of a grid are divided along its lines, straight or diagonal. If each unknown is coupled to all unknowns
+//! within k steps, a diagonal separator encloses twice as much as a straight separator of equal size. Other unknowns
+//! are divided along the levels of a breadth-first search (George and Liu's automatic nested dissection).
 
 use super::cut::{Cut, Scratch};
 use super::grid::{AXES, Grid, Item, Links};

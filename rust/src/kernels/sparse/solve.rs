@@ -6,8 +6,7 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::simd::wide_fn;
 
-/// Replaces right-hand sides by the solutions, all together, so that each number of the factor is
-/// read once.
+/// Replaces all right-hand sides by the solutions at the same time, so that each number of the factor is read once.
 pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -> Result<()> {
     let (plan, what) = (&factor.plan, "the solution");
     let most = plan

@@ -14,9 +14,9 @@
 //!
 //! Departures from the paper:
 //!
-//! - The sweeps move most of the flow of a segmentation in a few passes over memory, which takes 67
-//!   % less time. They may leave flow that does not reach a demand. This is harmless, because a
-//!   minimum cut does not require its return to the source.
+//! - The sweeps move most of the flow of a segmentation in a few passes over memory, which takes 67 % less time. Some
+//!   of the moved flow may not reach a demand. This is harmless, because a minimum cut does not require that this flow
+//!   returns to the source.
 //! - Children are found by looking at the neighbours instead of in lists, because a grid point has
 //!   few neighbours.
 //!
