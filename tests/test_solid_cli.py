@@ -156,7 +156,7 @@ WRONG = [
     ("solid v.npy -o none/out.tif", "does not exist"),
     ("solid w.npy -o out.tif", "w.npy: does not exist"),
     ("solid in.png -o out.tif", "in.png: is an image of 64 x 64, but a volume is needed"),
-    ("solid sample:dots -o out.tif", "sample:dots: must be a volume, got an image; volumes are particles"),
+    ("solid sample:dots -o out.tif", "sample:dots: must be a volume, got an image; built-in volumes are particles"),
     ("solid sample:dotz -o out.tif", "name: must be a generated sample"),
     ("solid v.npy", "Missing option"),
     ("synthesize v.npy -o out.png", "v.npy"),

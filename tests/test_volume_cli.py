@@ -93,7 +93,7 @@ def test_turntables_and_samples(here, capsys):
         ("out.png -o out.png", "out.png"),
         (
             "sample:bricks -o out.png",
-            "sample:bricks: must be a volume, got an image; volumes are particles, stripes, weave_solid",
+            "sample:bricks: must be a volume, got an image; built-in volumes are particles, stripes, weave_solid",
         ),
         ("v.npy", "Missing option"),
     ],

@@ -188,7 +188,8 @@ def extend(
     reach = parts[0].reach
     if len(parts) == 1 and reach is not None and (hole & ~reach).any():
         raise InvalidInput(
-            "top, bottom, left, right: the image would reach the horizon of the plane; add fewer pixels, or give the view"
+            "top, bottom, left, right: the image would reach the horizon of the plane; add fewer pixels, or give "
+            "another view"
         )
     made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
     lit = (-added["top"], -added["left"]) if follow else None

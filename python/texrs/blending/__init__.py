@@ -167,7 +167,7 @@ def blend(
     progress = listen(progress)
     as_instance(source, "source", SourceMap)
     if source.axes != 2:
-        raise InvalidInput("source: must be the source map of an image, got that of a volume")
+        raise InvalidInput("source: must be the source map of an image, got the source map of a volume")
     cyclic, across, outlines = as_wrap(wrap), as_bool(across, "across"), as_bool(outlines, "outlines")
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)

@@ -90,7 +90,7 @@ def read_volume(text: str, *, finite: bool = True) -> Array:
         volume: Array = samples.load(text.removeprefix(SAMPLE)).image
         if volume.ndim != 4:
             known = ", ".join(n for n in samples.names() if is_solid(n))
-            raise InvalidInput(f"{text}: must be a volume, got an image; volumes are {known}")
+            raise InvalidInput(f"{text}: must be a volume, got an image; built-in volumes are {known}")
     else:
         try:
             volume = io.read_volume(text)

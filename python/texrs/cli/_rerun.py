@@ -228,7 +228,7 @@ def compare(recipe: Recipe, made: str) -> None:
         say(f"{recipe.path}: was changed since it was made; its inputs still make what it was, SHA-256 {now}")
         return
     why = f"; it was made by texrs {recipe.version}, this is {__version__}" if recipe.version != __version__ else ""
-    raise InvalidInput(f"{recipe.path}: its inputs now give other bytes (SHA-256 {now}, the file has {then}){why}")
+    raise InvalidInput(f"{recipe.path}: a new run gives a different file (SHA-256 {now} instead of {then}){why}")
 
 
 # --- what a file holds -----------------------------------------------------------------------------------------------

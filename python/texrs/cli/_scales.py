@@ -64,7 +64,7 @@ def scale_map_command(
     chosen = [option for option, value in origins.items() if value is not None]
     if len(chosen) != 1:
         found = " and ".join(chosen) or "none of them"
-        raise InvalidInput(f"scale-map: must have one of {', '.join(list(origins)[:-1])} and --scale-map, got {found}")
+        raise InvalidInput(f"{', '.join(origins)}: exactly one must be given, got {found}")
     check_needed(given, {"--slant": ANGLES, "--mask": MASKS, "--auto": (*MASKS, *FOUND)}, chosen[0])
     if hole is not None and chosen[0] not in ("--mask", "--auto"):
         raise InvalidInput(f"--hole: must be used with --mask or --auto, got {chosen[0]}")

@@ -89,7 +89,7 @@ def tiles_command(
     asked, windowed = Asked.read(said, 2), size is not None
     for name, value in said.items():
         if value is not None and not windowed:
-            raise InvalidInput(f"--{name}: must be combined with --size, because it is of a window")
+            raise InvalidInput(f"--{name}: must be combined with --size, because it only affects windows")
     if windowed and index is not None:
         raise InvalidInput("--index: cannot be combined with --size (a window has no index texture)")
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")

@@ -118,7 +118,7 @@ def compare(
     """
     chosen = [as_choice(t, "tasks", tuple(TASKS)) for t in tasks]
     if not chosen or not pictures:
-        raise InvalidInput(f"{'tasks' if pictures else 'pictures'}: must contain at least one, got none")
+        raise InvalidInput(f"{'tasks' if pictures else 'pictures'}: must have at least one entry, got none")
     side = as_int(side, "side", LEAST, MOST)
     size = side * 3 // 2 if size is None else as_int(size, "size", side, 2 * MOST)
     seed = as_seed(seed)

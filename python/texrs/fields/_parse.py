@@ -90,7 +90,7 @@ def parse(
 
     """
     if not isinstance(text, str):
-        raise InvalidInput(f"field: must be words such as zigzag:period=64, got {type(text).__name__}")
+        raise InvalidInput(f"field: must be words, such as zigzag:period=64, got {type(text).__name__}")
     name, _, rest = text.strip().partition(":")
     if name not in _KNOWN:
         near = get_close_matches(name, _KNOWN, 1)

@@ -57,7 +57,9 @@ def check_material(given: dict[str, Any]) -> None:
     """Refuse a hole that is defined by the values of one image if there are several maps."""
     marks = as_marks(given.get("mask")).marks
     if _is_alpha(marks) or _is_value(marks):
-        raise InvalidInput("mask: must be a mask, because the image is a material, whose maps have it in common")
+        raise InvalidInput(
+            "mask: must be a mask, because the image is a material, and one hole applies to all its maps"
+        )
 
 
 def _is_alpha(marks: object) -> bool:
@@ -83,7 +85,7 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
     """Return the mask of the pixels that are not fully opaque, or whose alpha is below a threshold."""
     if pixels.ndim != axes + 1 or pixels.shape[-1] not in (2, 4):
         raise InvalidInput(
-            f"mask: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+            f"mask: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; give a mask instead"
         )
     alpha = pixels[..., -1]
     full = float(np.iinfo(alpha.dtype).max) if alpha.dtype.kind in "ui" else 1.0

@@ -503,9 +503,9 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
     if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":
         raise InvalidInput(f"faces: must be integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
     if not np.isfinite(corners).all() or not 0 < len(triangles) < 2**32:
-        raise InvalidInput("vertices, faces: must be finite corners and at least one triangle")
+        raise InvalidInput("vertices, faces: must be finite vertices and at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
-        raise InvalidInput(f"faces: must be numbers of corners from 0 to {len(corners) - 1}")
+        raise InvalidInput(f"faces: must be indices of vertices from 0 to {len(corners) - 1}")
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 

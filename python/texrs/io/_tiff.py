@@ -303,7 +303,7 @@ def _add_profile(tif: Any, profile: bytes) -> None:
     entries.sort(key=lambda entry: struct.unpack(layout.tagnoformat[0] + "H", entry[:2]))
     start = at + len(profile) + len(profile) % 2
     if start > 2 ** (8 * layout.offsetsize) - 2**17:
-        raise FileError("the profile does not fit into 4 GB")
+        raise FileError("the ICC profile cannot be added, because the file is at the 4 GiB limit of classic TIFF")
     number = struct.pack(layout.tagnoformat, len(entries))
     file.write(b"".join([profile.ljust(start - at, b"\0"), number, *entries, following]))
     file.seek(layout.offsetsize)
@@ -394,7 +394,7 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
             size = _measure(key.compression, data, most)
             if size > most:
                 raise FileError(
-                    f"{path}: is corrupt; a strip unfolds to more than {most} bytes, which its pixels do not need"
+                    f"{path}: is corrupt; a strip expands to more than {most} bytes, more than its pixels need"
                 )
 
 

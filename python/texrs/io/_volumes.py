@@ -253,7 +253,7 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
     second = start[:4] in NIFTI_MAGIC[2:]
     need = 540 if second else 348
     if len(start) < need:
-        raise FileError(f"{path}: is cut off; its NIfTI header does not end")
+        raise FileError(f"{path}: is cut off; its NIfTI header is incomplete")
     if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
         raise FileError(f"{path}: must be a NIfTI file that contains its own samples")
     kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header

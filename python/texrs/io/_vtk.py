@@ -48,7 +48,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         root = ElementTree.fromstring(content[:] if start < 0 else content[:start] + b"</VTKFile>")
         pieces = root.findall("ImageData/Piece")
         if root.tag != "VTKFile" or len(pieces) != 1:
-            raise FileError(f"{path}: must be image data of one piece")
+            raise FileError(f"{path}: must be image data (.vti) in exactly one piece")
         # The extent counts points. There is one cell fewer along each axis.
         low, high = (np.array(pieces[0].get("Extent", "").split(), int)[a::2] for a in (0, 1))
         groups = {kind: pieces[0].find(kind) for kind in ("PointData", "CellData")}
@@ -82,7 +82,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         if len(samples) < size:
             raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {len(samples)} follow")
         if root[0].get("WholeExtent", "").split() != pieces[0].get("Extent", "").split():
-            raise FileError(f"{path}: must have a piece of the length of its whole extent")
+            raise FileError(f"{path}: must have one piece that covers its whole extent")
         shape = sides if channels == 1 else (*sides, channels)
         return np.frombuffer(samples, dtype, size // dtype.itemsize).reshape(shape).astype(dtype.newbyteorder("="))
 

@@ -79,7 +79,7 @@ def gather(
         raise InvalidInput(f"coordinates: must have shape (..., 2) or (..., 3), got {points.shape}")
     several = [as_ndarray(e, "exemplars", axes=axes) for e in as_list(exemplars)]
     if not several:
-        raise InvalidInput("exemplars: must contain at least one, got none")
+        raise InvalidInput("exemplars: must contain at least one exemplar, got none")
     images = [as_image(e, "exemplars", axes=axes, finite=False) for e in several]
     kinds = {(e.dtype.str, e.shape[-1]) for e in images}
     if len(kinds) > 1:

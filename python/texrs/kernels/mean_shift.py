@@ -91,7 +91,7 @@ def mean_shift(
     image = as_ndarray(image, "image")
     given = as_image(image)
     if given.dtype.kind == "f" and float(max(given.max(), -given.min())) > _MOST:
-        raise InvalidInput(f"image: must have values of at most {_MOST:g}, got {np.abs(given).max()}")
+        raise InvalidInput(f"image: must have values of at most {_MOST:g} in magnitude, got {np.abs(given).max()}")
     ball = as_float(range, "range", 0, _MOST)
     near = _MOST if tolerance is None else as_float(tolerance, "tolerance", 0, _MOST)
     found = _rust.mean_shift(

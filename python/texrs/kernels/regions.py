@@ -88,7 +88,7 @@ def felzenszwalb(
     """
     given = as_image(as_ndarray(image, "image"))
     if given.dtype.kind == "f" and float(max(given.max(), -given.min())) > _MOST:
-        raise InvalidInput(f"image: must have values of at most {_MOST:g}, got {np.abs(given).max()}")
+        raise InvalidInput(f"image: must have values of at most {_MOST:g} in magnitude, got {np.abs(given).max()}")
     return _rust.merge_regions(
         np.ascontiguousarray(given, dtype=np.float32),
         as_float(scale, "scale", 0, _MOST),

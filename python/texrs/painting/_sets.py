@@ -77,7 +77,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Unwra
     which, names = _choose(surface, bare, tile)
     if len(names) > MOST:
         raise InvalidInput(
-            f"mesh: its UVs need {len(names)} texture sets, more than {MOST}; lay it out with unwrap (--unwrap)"
+            f"mesh: its UVs need {len(names)} texture sets, more than {MOST}; pass unwrap (--unwrap) for another layout"
         )
     if len(names) > 1:
         why = "its UVs overlap" if not tile.any() else "its UVs are in several tiles"

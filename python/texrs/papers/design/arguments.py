@@ -178,7 +178,7 @@ def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
     """Check that the exemplars can be mixed, and that labels are given for all exemplars or none."""
     if not exemplars:
-        raise InvalidInput("exemplar: must contain at least one, got none")
+        raise InvalidInput("exemplar: must contain at least one exemplar, got none")
     kinds = [(e.pixels.dtype.name, e.pixels.shape[-1]) for e in exemplars]
     if len(set(kinds)) > 1:
         raise InvalidInput(f"exemplar: must have the same dtype and channels in all exemplars, got {kinds}")

@@ -86,7 +86,7 @@ def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple
     if beyond.all():
         raise InvalidInput(
             f"target: must be within {low:.3g} to {high:.3g}, the scales of the exemplar's copies, got "
-            f"{target.min():.3g} to {target.max():.3g}; or give other augment_scales"
+            f"{target.min():.3g} to {target.max():.3g}; give other augment_scales"
         )
     factor = max(low / float(target.min()), float(target.max()) / high, 1.0)
     share = float(beyond.mean())

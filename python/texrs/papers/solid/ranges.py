@@ -40,10 +40,11 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
         if isinstance(part, slice):
             if part.start is None or part.stop is None:
                 raise InvalidInput(
-                    f"texture: must have both ends of a range, start:stop, because it is unbounded; got {_spell(part)}"
+                    "texture: each range must have both ends, start:stop, because the texture is unbounded; "
+                    f"got {_spell(part)}"
                 )
             if part.step is not None:
-                raise InvalidInput(f"texture: must have ranges without a step, got {_spell(part)}")
+                raise InvalidInput(f"texture: each range must be without a step, got {_spell(part)}")
             start, stop = _as_end(part.start), _as_end(part.stop)
         elif one:
             start = _as_end(part)

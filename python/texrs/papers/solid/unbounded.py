@@ -325,7 +325,9 @@ class Texture(Endless):
 
         """
         if self._material is None:
-            raise InvalidInput("texture: must be of a material, got one of an array; use sample() for its values")
+            raise InvalidInput(
+                "texture: must be made from a material, got one made from an array; use sample() for its values"
+            )
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
 
     def trace(self, points: ArrayLike, *, progress: Progress | bool | None = None) -> SourceMap:
