@@ -129,7 +129,7 @@ def blend(
     Raises
     ------
     InvalidInput
-        The source map is of a volume, an option is out of range, or the number or size of the exemplars differs from
+        If the source map is of a volume, an option is out of range, or the number or size of the exemplars differs from
         the source map.
 
     Notes
@@ -245,7 +245,7 @@ def apply(
     Raises
     ------
     InvalidInput
-        The number or size of the exemplars differs from those of the source map, or the type of the map is unknown.
+        If the number or size of the exemplars differs from those of the source map, or the type of the map is unknown.
 
     Examples
     --------

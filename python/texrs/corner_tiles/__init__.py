@@ -83,9 +83,9 @@ class CornerTiles(InParts):
     Raises
     ------
     InvalidInput
-        `texrs.design` refuses the exemplar, or an option is out of its range.
+        If `texrs.design` refuses the exemplar, or an option is out of its range.
     Cancelled
-        The work was stopped.
+        If the work was stopped.
 
     Examples
     --------
@@ -210,7 +210,7 @@ class CornerTiles(InParts):
         Raises
         ------
         InvalidInput
-            The origin or size is not valid.
+            If the origin or size is not valid.
 
         Examples
         --------
@@ -266,7 +266,7 @@ class CornerTiles(InParts):
         Raises
         ------
         InvalidInput
-            The origin or size is not valid.
+            If the origin or size is not valid.
 
         Examples
         --------
@@ -338,7 +338,7 @@ class CornerTiles(InParts):
         Raises
         ------
         FileError
-            A file cannot be written.
+            If a file cannot be written.
 
         Examples
         --------

@@ -105,7 +105,7 @@ def analyse(
     Raises
     ------
     InvalidInput
-        An argument has an invalid shape, type or range, or the box is outside the image. The background contradicts
+        If an argument has an invalid shape, type or range, or the box is outside the image. The background contradicts
         the box or the mask, or the layout contradicts the mask. A correction is impossible, or fewer than three
         elements are found.
 

@@ -61,7 +61,7 @@ class Arrangement:
         Raises
         ------
         KeyError
-            The layout does not exist.
+            If the layout does not exist.
 
         Examples
         --------

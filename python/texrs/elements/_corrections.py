@@ -64,7 +64,7 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
     Raises
     ------
     InvalidInput
-        A step is invalid, or refers to a missing element or to a place outside the image. Fewer than three elements
+        If a step is invalid, or refers to a missing element or to a place outside the image. Fewer than three elements
         remain, or the foreground becomes empty.
 
     Examples

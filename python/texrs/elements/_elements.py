@@ -129,7 +129,7 @@ class ElementAnalysis:
         Raises
         ------
         InvalidInput
-            The elements of the sample are not known.
+            If the elements of the sample are not known.
 
         Examples
         --------
@@ -182,7 +182,7 @@ class ElementAnalysis:
         Raises
         ------
         InvalidInput
-            The labels have another shape than the image, there are fewer than three elements, or separate elements
+            If the labels have another shape than the image, there are fewer than three elements, or separate elements
             have no background.
 
         Examples
@@ -296,7 +296,7 @@ class ElementAnalysis:
         Raises
         ------
         InvalidInput
-            ``k`` is out of range.
+            If ``k`` is out of range.
 
         Examples
         --------
@@ -329,7 +329,7 @@ class ElementAnalysis:
         Raises
         ------
         InvalidInput
-            ``k`` is out of range.
+            If ``k`` is out of range.
 
         Examples
         --------
@@ -353,7 +353,7 @@ class ElementAnalysis:
         Raises
         ------
         FileError
-            The file cannot be written.
+            If the file cannot be written.
 
         Examples
         --------
@@ -408,7 +408,7 @@ def hash_image(image: Array) -> str:
     Raises
     ------
     InvalidInput
-        The argument is not an image.
+        If the argument is not an image.
 
     Examples
     --------
@@ -440,7 +440,7 @@ def load(path: Path) -> ElementAnalysis:
     Raises
     ------
     FileError
-        The file is missing or damaged, has another version, or does not contain an analysis.
+        If the file is missing or damaged, has another version, or does not contain an analysis.
 
     Examples
     --------

@@ -38,7 +38,7 @@ class ElementSearch:
     Raises
     ------
     InvalidInput
-        A field has another type or range.
+        If a field has another type or range.
 
     Examples
     --------

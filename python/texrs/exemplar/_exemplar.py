@@ -83,7 +83,7 @@ class Exemplar:
     Raises
     ------
     InvalidInput
-        The argument is not an image or a volume, or has its channels first. Values are masked or not finite,
+        If the argument is not an image or a volume, or has its channels first. Values are masked or not finite,
             labels have several channels, or an option is invalid.
 
     See Also
@@ -201,7 +201,7 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            A side is below 16, or the windows do not fit.
+            If a side is below 16, or the windows do not fit.
 
         Examples
         --------
@@ -255,9 +255,9 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            The level does not exist, or it does not contain ``k`` samples at this distance from each other.
+            If the level does not exist, or it does not contain ``k`` samples at this distance from each other.
         Cancelled
-            The work was cancelled.
+            If the work was cancelled.
 
         Examples
         --------
@@ -329,7 +329,7 @@ class Exemplar:
         Raises
         ------
         InvalidInput
-            The exemplar is a volume, or the labels have another shape.
+            If the exemplar is a volume, or the labels have another shape.
 
         Examples
         --------
@@ -379,7 +379,7 @@ class Exemplar:
         Raises
         ------
         TypeError
-            The key is not hashable. Exceptions from ``make`` are passed on, and nothing is cached.
+            If the key is not hashable. Exceptions from ``make`` are passed on, and nothing is cached.
 
         Examples
         --------
@@ -410,7 +410,7 @@ class Exemplar:
         Raises
         ------
         FileError
-            The file cannot be written.
+            If the file cannot be written.
 
         Examples
         --------
@@ -446,7 +446,7 @@ class Exemplar:
         Raises
         ------
         FileError
-            The file cannot be read, has another version, or is damaged.
+            If the file cannot be read, has another version, or is damaged.
 
         Examples
         --------
@@ -534,9 +534,9 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     Raises
     ------
     InvalidInput
-        The exemplar has another number of axes, or the value is not an array, or it is too small.
+        If the exemplar has another number of axes, or the value is not an array, or it is too small.
     FileError
-        The path cannot be read.
+        If the path cannot be read.
 
     Examples
     --------

@@ -92,7 +92,7 @@ class Analysis:
         Raises
         ------
         InvalidInput
-            An array is missing, or the arrays do not match each other.
+            If an array is missing, or the arrays do not match each other.
 
         Examples
         --------

@@ -170,7 +170,7 @@ def find_cells(
     Raises
     ------
     InvalidInput
-        An argument has another type, shape or range.
+        If an argument has another type, shape or range.
 
     Examples
     --------

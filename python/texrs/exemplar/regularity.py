@@ -123,7 +123,7 @@ class Lattice:
         Raises
         ------
         InvalidInput
-            ``reach`` is not a number from 0 to 4096.
+            If ``reach`` is not a number from 0 to 4096.
 
         Examples
         --------

@@ -59,7 +59,7 @@ class ElementOptions:
     Raises
     ------
     InvalidInput
-        A field has another type or is out of range. The message names it.
+        If a field has another type or is out of range. The message names it.
 
     Examples
     --------
@@ -106,7 +106,7 @@ class ElementOptions:
         Raises
         ------
         InvalidInput
-            The list does not contain labels for this exemplar.
+            If the list does not contain labels for this exemplar.
 
         Examples
         --------
@@ -203,7 +203,7 @@ class Segmentation:
         Raises
         ------
         InvalidInput
-            ``reach`` is not a number from 1e-6 to 1e9.
+            If ``reach`` is not a number from 1e-6 to 1e9.
 
         Examples
         --------
@@ -248,7 +248,7 @@ def segment(
     Raises
     ------
     InvalidInput
-        The image or the labels have another shape or type.
+        If the image or the labels have another shape or type.
 
     Examples
     --------

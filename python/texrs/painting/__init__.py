@@ -113,7 +113,7 @@ class TexturedMesh:
         Raises
         ------
         FileError
-            The suffix is another one, or a file cannot be written.
+            If the suffix is another one, or a file cannot be written.
 
         Examples
         --------
@@ -186,9 +186,9 @@ def texture_mesh(
     Raises
     ------
     InvalidInput
-        The mesh has no triangles, or an option is out of its range.
+        If the mesh has no triangles, or an option is out of its range.
     FileError
-        The file cannot be read.
+        If the file cannot be read.
 
     Examples
     --------

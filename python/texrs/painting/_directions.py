@@ -73,9 +73,9 @@ def field_on_surface(
     Raises
     ------
     InvalidInput
-        The directions are invalid, or are perpendicular to the surface everywhere.
+        If the directions are invalid, or are perpendicular to the surface everywhere.
     FileError
-        A file cannot be read.
+        If a file cannot be read.
 
     Examples
     --------

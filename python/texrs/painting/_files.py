@@ -41,7 +41,7 @@ def check_suffix(path: Path, *, baked: bool) -> str:
     Raises
     ------
     FileError
-        The format is unknown, or is .ply for an atlas.
+        If the format is unknown, or is .ply for an atlas.
 
     """
     suffix = FilePath(path).suffix.lower()

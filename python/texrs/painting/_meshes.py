@@ -23,7 +23,7 @@ def unwrap(
     Raises
     ------
     InvalidInput
-        xatlas is not installed.
+        If xatlas is not installed.
 
     """
     try:

@@ -28,7 +28,7 @@ def read_obj(name: str, text: str) -> Surface:
     Raises
     ------
     FileError
-        A line cannot be read.
+        If a line cannot be read.
 
     """
     rows: dict[str, list[list[float]]] = {"v": [], "vt": [], "vn": []}

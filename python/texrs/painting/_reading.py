@@ -29,9 +29,9 @@ def read_mesh(mesh: Any) -> Surface:
     Raises
     ------
     InvalidInput
-        The mesh has no triangles.
+        If the mesh has no triangles.
     FileError
-        The file cannot be read.
+        If the file cannot be read.
 
     """
     if isinstance(mesh, Surface):

@@ -56,7 +56,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Unwra
     Raises
     ------
     InvalidInput
-        Faces cross the borders of tiles, or there are too many sets.
+        If faces cross the borders of tiles, or there are too many sets.
 
     """
     bare: NDArray[np.bool_] = np.ones(len(surface.faces), bool)

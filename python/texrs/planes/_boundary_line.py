@@ -22,24 +22,24 @@ ANGLES, SHARES = np.arange(0, 180, 15), np.arange(0.15, 0.86, 0.05)
 FEWEST = 12
 """Minimum number of windows on each side of a line."""
 DARK, FLAT = 0.02, 1e-5
-"""Offsets of colours and of squared contrasts before their logarithms are taken."""
+"""Values that are added to colours and to squared contrasts before their logarithms are computed."""
 USUAL = np.array([0.025, 0.025, 0.05, 0.05, 0.025])
 """Minimum deviation that is assumed for two ratios of colours, two relative contrasts and the brightness."""
 EVEN = 0.05
 """Weight of the penalty on changes across the image, relative to the number of windows."""
 BETTER, COLOURED = 0.8, 0.1
-"""Minimum gain of two changes over one: over ratios and contrasts, and over ratios and brightness.
+"""Minimum gain of two slow changes over one slow change: from ratios and contrasts, and from ratios and brightness.
 
-It is a sum of logarithms of the ratio of residuals. The second limit excludes the far end of a floor, where only the
-contrast falls.
+A gain is a sum of logarithms of the ratio of residuals. The second limit excludes the far end of a floor, where only
+the contrast falls.
 """
 
 
 def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools | None:
-    """Return the larger side of the line across which the windows change abruptly, or None.
+    """Return the larger side of the line across which the windows change abruptly, or None if there are none.
 
-    The facts (H, W, 5) are the means of three colours and of two bands of squared detail in windows. `reach` is the
-    standard deviation of the windows.
+    Each window has five facts (H, W, 5): the means of three colours and of two bands of squared detail. `reach` is the
+    standard deviation of the windows in pixels.
     """
     # Use quantities that light does not change, and the brightness.
     colours, details = np.log(facts[..., :3] + DARK), 0.5 * np.log(facts[..., 3:] + FLAT)

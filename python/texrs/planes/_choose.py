@@ -1,4 +1,4 @@
-"""Choose the plane that the user gives, or find it."""
+"""Use the plane that the user gives, or find the plane in the image."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FLAT = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A plane in a photograph, as given or as found."""
+    """A plane in a photograph, given by the user or found."""
 
     plane: Plane
     ground: Bools
@@ -35,7 +35,7 @@ class Seen:
 
 
 def see(pixels: Array, view: PlaneView) -> Seen:
-    """Return the given facts about a plane, and find the others; warn if the plane is uncertain.
+    """Return the given facts about a plane, and find the missing facts; warn if the plane is uncertain.
 
     All facts are checked before the search starts.
     """
@@ -55,7 +55,7 @@ def see(pixels: Array, view: PlaneView) -> Seen:
 
 
 def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
-    """Return the plane, None if uncertain or seen from the front, and whether it was found; warn if uncertain."""
+    """Return the plane and whether it was found; None and a warning if it is uncertain, None if seen from the front."""
     if said is not None:
         return (None if said.slant < FLAT else said), False
     try:
@@ -88,7 +88,7 @@ def as_views(view: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> li
 def find_grounds(
     pixels: Array, settled: Sequence[tuple[Plane | None, Bools | None]], known: Bools, *, everywhere: bool
 ) -> list[Bools]:
-    """Return the mask of each plane: as given, or as found in the pixels that the others leave.
+    """Return the mask of each plane: the given mask, or the plane found in the pixels outside the other masks.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def find_grounds(
     known : (H, W) bool
         Mask of the known pixels.
     everywhere : bool
-        If True, a plane of known orientation without a mask gets all pixels that the others leave.
+        If True, a plane of known orientation without a mask gets all pixels outside the other masks.
 
     """
     free, found = known.copy(), []

@@ -34,15 +34,15 @@ FINE = 1.0, 1.6
 HALVED, FIRST = 400, 4
 """Minimum longer side in pixels for first rounds at half the resolution; and maximum number of these rounds."""
 RIGHT, STRAIGHT = (8.0, 15.0), 20.0
-"""Maximum errors of slant and tilt of a correct plane; and slant below which a larger error of the tilt is accepted.
+"""Minimum longer side in pixels for starting at half the resolution; and maximum number of rounds there.
 
 All are in degrees. A small slant does not determine the tilt well.
 """
 DOUBT = 0.04, 0.05, 0.35, 0.4
-"""Parts of the standard deviation of the rise over the longer side, which the confidence assumes.
+"""Terms of the standard deviation of the rise over the longer side. The confidence depends on this deviation.
 
-They are a constant, and factors of the rise, of the deviation of measurements from the plane, and of the difference
-between bands. Chosen on 168 generated floors.
+The terms are a constant, and factors of the rise, of the deviation of measurements from the plane, and of the
+difference between bands. Chosen on 168 generated floors.
 """
 ROUGH = 0.25
 """Deviation of measurements from the plane that lowers the confidence to 1 / e.
@@ -52,15 +52,15 @@ Curved surfaces deviate more, and so do images without a surface.
 SMALL = 256
 """Longer side in pixels below which bands may differ more: fewer elements are visible, and each is more blurred."""
 UNSURE = 0.02, 0.03, 2.0
-"""Parts of the standard deviation of the rise from patterns over the longer side.
+"""Terms of the standard deviation of the rise from patterns over the longer side.
 
-They are a constant, and factors of the rise and of the deviation of measurements. The difference between bands is
+The terms are a constant, and factors of the rise and of the deviation of measurements. The difference between bands is
 added.
 """
 SHARED = 0.5
 """Minimum share of the bands' difference that remains after lines are used, because both bands use the same lines."""
 FEWEST = 20
-"""Minimum number of lines for using them."""
+"""Minimum number of lines. If there are fewer, lines are not used."""
 
 
 def find(image: object, *, fov: float | None = None, known: object = None) -> Plane:
@@ -71,8 +71,8 @@ def find(image: object, *, fov: float | None = None, known: object = None) -> Pl
     image : (H, W) or (H, W, C) array
         An oblique view of a plane with a homogeneous texture, each side at least 64 pixels.
     fov : float, optional
-        Angle of view of the longer side in degrees, 1 to 170. The image does not determine it. The tilt is valid for
-        any angle, the slant only for this one. Default: `FOV`.
+        Angle of view of the longer side in degrees, 1 to 170. The image does not determine this angle. The tilt is
+        valid for any angle of view, the slant only for this angle. Default: `FOV`.
     known : (H, W) bool array, optional
         Mask of the pixels that show the plane. Default: all pixels.
 
@@ -132,7 +132,7 @@ def _shrink(colours: Floats, known: Bools, step: int) -> tuple[Floats, Bools]:
 def look(grey: Floats, known: Bools, focal: float) -> tuple[Reals, float]:
     """Return the rise (2,) of the width over the longer side, and its confidence.
 
-    The focal length is over this side too.
+    The focal length is also relative to the longer side.
     """
     side = max(grey.shape)
     starts = [np.zeros(2) for _ in FINE]

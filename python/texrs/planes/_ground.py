@@ -37,7 +37,7 @@ RANGE, PLAIN = np.array([1.0, 1.0, 1.0, 4.0, 4.0]), -5.0
 LOOSE = 1.5
 """Maximum deviation within one ground, as a multiple of the minimum deviation."""
 POWER = 4
-"""Exponent of the mean of deviations. It is high so that one large deviation counts."""
+"""Exponent of the mean of deviations. It is high so that one large deviation is enough."""
 EVEN = 1.0
 """Weight of the penalty on changes across the image, relative to the fit. Positions are from -1 to 1."""
 FAR = 4.0
@@ -49,7 +49,7 @@ BINS, FINE = 12, 0.012
 DOUBT = 2.0
 """Width of the band along a border where colours decide, as a multiple of the windows' standard deviation."""
 PART, USUAL = 0.08, 0.25
-"""Maximum share of the image of a part that is returned to the ground, and quantile for its colours.
+"""Maximum area of a part that is added back to the ground, as a share of the image; and quantile for its colours.
 
 The median likelihood of its colours must reach this quantile of the likelihoods within the ground.
 """
@@ -202,7 +202,7 @@ def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
 
 
 def list_starts(thin: Bools) -> list[Bools]:
-    """Return parts of an image that may be ground: all of it, its halves, and its middle."""
+    """Return initial guesses of the ground: the whole image, its halves, and its middle."""
     rows, columns = np.indices(thin.shape)
     height, width = thin.shape
     middle = (np.abs(rows - height / 2) < height / 4) & (np.abs(columns - width / 2) < width / 4)
@@ -218,7 +218,7 @@ def measure_off(rest: NDArray[np.float64], spread: NDArray[np.float64]) -> NDArr
 def fit(
     terms: NDArray[np.float64], facts: NDArray[np.float64], start: Bools, least: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fit a slow change to a part and all windows that follow it; return coefficients (terms, facts) and spread."""
+    """Fit a slow change to a part and all windows that follow it; return coefficients (terms, facts) and deviations."""
     weight = start.astype(np.float64)
     coefficients, spread = np.zeros((terms.shape[1], facts.shape[1])), least
     even = np.diag([0.0] + [EVEN] * (terms.shape[1] - 1))
@@ -246,7 +246,7 @@ def measure_chances(cell: NDArray[np.intp], part: Bools) -> NDArray[np.float64]:
 
 
 def return_parts(cell: NDArray[np.intp], known: Bools, ground: Bools) -> Bools:
-    """Return the ground with smaller other parts that have its colours, such as one large tile of a floor."""
+    """Add small parts that have the colours of the ground back to the ground, such as one large tile of a floor."""
     from scipy.ndimage import label
 
     own = ground & known

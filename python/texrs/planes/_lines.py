@@ -7,8 +7,8 @@ Borders are detected as by Burns et al. Adjacent pixels whose slopes have about 
 its principal axis is a line. A mixture model then describes the lines: a line runs in one of the two directions, with
 an error, or in a random direction.
 
-J. B. Burns, A. R. Hanson and E. M. Riseman, "Extracting straight lines", IEEE Transactions on Pattern Analysis and Machine
-Intelligence 8, 1986.
+J. B. Burns, A. R. Hanson and E. M. Riseman, "Extracting straight lines", IEEE Transactions on Pattern Analysis and
+Machine Intelligence 8, 1986.
 """
 
 from __future__ import annotations
@@ -39,11 +39,13 @@ TANGENT = 0.4142135623730951
 ASKEW = 0.12
 """Maximum sine of the angle between a line and the perpendicular of its slopes."""
 MOST = 1500
-"""Maximum number of lines. The longest are used."""
+"""Maximum number of lines that are used. If there are more, the longest are used."""
 COUNTED, TOLD = 60.0, 300.0
-"""Maximum length of a line that counts, in pixels; and length that is worth one independent measurement.
+"""Length above which longer lines do not count more; and length that is worth one independent measurement.
 
-The second is longer because adjacent lines are not independent.
+Both in pixels.
+
+The second length is larger because adjacent lines are not independent.
 """
 FINEST, BROADEST = np.radians(0.7), np.radians(12.0)
 """Minimum and maximum standard deviation of the angle between a line and its direction."""
@@ -159,7 +161,7 @@ def _tell_eighths(slopes: Reals, turn: float) -> NDArray[np.intp]:
 
 
 def _join(kinds: NDArray[np.intp], beside: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the number of the connected part of each pixel. Adjacent pixels of the same kind are connected."""
+    """Return the index of the connected part of each pixel. Adjacent pixels of the same kind are connected."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -34,12 +34,12 @@ FULL = 0.55
 CAMERA = 0.55
 """Standard deviation of the blur of one camera pixel, in pixels."""
 FAR, COARSE = 0.35, 0.1
-"""Minimum scale that is used, as a share of the scale in the middle; and quantile of scales for the resolution.
+"""Minimum scale that is used, as a share of the scale in the middle; and quantile of scales that sets the resolution.
 
-The flattened image gets the resolution of this quantile. A finer one would blur distant parts.
+The flattened image has the resolution of this quantile. A finer resolution would blur distant parts.
 """
 LEVELS = 4
-"""Number of blur levels, with the image itself. Each level is for twice the step of the level before."""
+"""Number of blur levels, including the image itself. Each level is for twice the step of the previous level."""
 ROUNDS, STEPS = 8, 10
 """Maximum number of rounds, each with a new flattening, and of steps of each fit."""
 SETTLED = 0.015
@@ -47,14 +47,14 @@ SETTLED = 0.015
 LONGEST = 4.0
 """Maximum length of an extrapolated step, as a multiple of the fitted change."""
 STEP, PARTS = 1e-3, 2.0**15
-"""Step of the finite differences of a fit; and 1 / the unit to which its result is rounded.
+"""Step of the finite differences of a fit; and number of steps per unit to which its result is rounded.
 
-Its last bits depend on the processor.
+The result is rounded because its last bits depend on the processor.
 """
 LEAST = 0.03
 """Minimum standard deviation that is assumed for the measurements, in natural logarithms."""
 TILTED = 0.95
-"""Maximum fall of the scale from the middle to a corner, as a share. It keeps the horizon outside the image."""
+"""Maximum fall of the scale from the middle to a corner, as a share. This limit keeps the horizon outside the image."""
 FARTHEST = 0.3
 """Maximum change of the rise over the longer side in one step of a fit."""
 DEVIATES = 1.4826

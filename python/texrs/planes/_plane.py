@@ -53,8 +53,8 @@ class Plane:
         Direction in the image along which depth grows, in degrees counter-clockwise from +x with y up. Default: 90, a
         floor.
     fov : float, optional
-        Angle of view of the longer side in degrees, 1 to 170. Distant elements have the right size only if it is about
-        right. Default: `FOV`.
+        Angle of view of the longer side in degrees, 1 to 170. The sizes of distant elements are right only if this
+        angle is about right. Default: `FOV`.
     rotation : float
         Rotation of the flattened plane in degrees, counter-clockwise, for example to level courses of bricks. Default:
         0.
@@ -114,8 +114,8 @@ class Plane:
         shape : (rows, columns)
             Size of the image in pixels.
         horizon : (2, 2) array_like
-            Two points (row, column), which may be outside the image. The plane is on the same side as the middle of
-            the image.
+            Two points (row, column), which may be outside the image. The plane is on the side of the horizon that
+            contains the middle of the image.
         fov : float, optional
             Angle of view of the longer side in degrees, 1 to 170. Default: `FOV`.
 
@@ -151,8 +151,8 @@ class Plane:
         shape : (rows, columns)
             Size of the image in pixels.
         points : (2, 2) array_like
-            Vanishing points (row, column) of the first and the second direction. They are far outside if the lines of
-            a direction are parallel in the image.
+            Vanishing points (row, column) of the first and the second direction. A point is very far outside the image
+            if the lines of its direction are parallel in the image.
         fov : float, optional
             Angle of view of the longer side in degrees, 1 to 170. Default: the angle that makes the directions
             perpendicular, or `FOV` if a point is too far away to determine it.
@@ -160,8 +160,8 @@ class Plane:
         Returns
         -------
         Plane
-            A plane that is rotated so that lines to the first point are columns of the flattened plane, or rows if
-            those are closer.
+            A plane that is rotated so that lines to the first point are columns of the flattened plane. They are
+            rows if rows need less rotation.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class Plane:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Plane:
-        """Return the plane of a mapping that `as_dict` returned.
+        """Return the plane that a mapping from `as_dict` describes.
 
         Parameters
         ----------
@@ -294,7 +294,7 @@ class Plane:
         Raises
         ------
         InvalidInput
-            If it is not such a mapping, or a value is out of its range.
+            If `given` is not such a mapping, or a value is out of its range.
 
         Examples
         --------

@@ -15,7 +15,7 @@ from texrs.errors import InvalidInput
 DIGITS = 12
 """Number of significant digits of results. Later digits depend on the processor."""
 GRID = 2.0**40
-"""Inverse of the unit to which matrices are rounded, in pixels or as a plain number."""
+"""Number of steps per unit to which matrices are rounded. The unit is a pixel, or 1 for numbers without a unit."""
 
 
 def find_focal(shape: Sequence[int], fov: float) -> float:
@@ -45,7 +45,7 @@ def as_places(points: object) -> NDArray[np.float64]:
 
 
 def along(points: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the product of points (..., 2) with a direction.
+    """Return the dot products of points (..., 2) with a direction.
 
     A matrix product would depend on the processor in its last bits.
     """

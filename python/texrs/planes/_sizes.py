@@ -1,4 +1,4 @@
-"""Measure the size of elements all over an image: on a plane, on a curved surface, or on any other.
+"""Measure the size of elements all over an image: on a plane, on a curved surface, or on any other surface.
 
 If no plane fits, several independent methods measure the sizes: fine and coarse patterns (`_patterns`), and masks of
 pixels that are lighter than their surroundings. The masks have several limits of the smallest feature. A single mask
@@ -42,14 +42,13 @@ LADDER, SETTLING = tuple(0.6 * 1.3**k for k in range(9)), 6
 A fixed Gaussian blurs small patterns away and misses a third to a half of the change in size.
 """
 FINEST, DETAILS = 1 / 400, (1.0, 2.5, 6.0)
-"""Smallest feature of a mask as a share of the shorter side, at least one pixel; and its multiples, one for each mask.
-"""
+"""Smallest feature of a mask as a share of the shorter side, at least one pixel; and its multiple for each mask."""
 LATTICE = 24
 """Approximate number of positions along each side for comparing maps."""
 APART, LEVEL = 0.6, 0.03
 """Maximum difference of two maps that agree, and the least value of this limit. Both are standard deviations.
 
-The first is a share of the larger standard deviation of the two maps, the second is in natural logarithms.
+The first limit is a share of the larger standard deviation of the two maps, the second is in natural logarithms.
 """
 BENT, MORE = 0.04, 0.8
 """Maximum deviation from a plane that is good enough, and the same as a share of the variation of the plane.
@@ -74,15 +73,16 @@ class ScaleEstimate:
     Attributes
     ----------
     scale : (H, W) ScaleMap
-        Scale map. Its kind is "width" if the shape is a plane, else "area". It is also "area" if the image is too
-        small for patterns.
+        Scale map. Its kind is "width" if the shape is a plane, else "area". The kind is also "area" if the image is
+        too small for patterns.
     shape : {"plane", "curved", "free", "even"}
         Surface that was measured. "plane": a plane. "curved": sizes that are quadratic in the position, as on a
         cylinder or a bulge. "free": neither. "even": no agreement, so all elements are taken to be equally large.
     plane : Plane or None
         The plane that was found. None for other shapes, and for a plane that only fits the measured sizes.
     confidence : float
-        Agreement of the measurements by several methods, 0 to 1. It is 0 if the image is too small for more than one.
+        Agreement of the measurements by several methods, 0 to 1. The confidence is 0 if the image is too small for
+        more than one method.
 
     Examples
     --------
@@ -205,7 +205,7 @@ def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
 
 
 def look_up(sizes: Reals, steps: Reals) -> Reals:
-    """Interpolate a ladder of values at a fractional rung for each position (column), clipped to its ends."""
+    """Interpolate a table of values at a fractional index for each position (column), clipped to its ends."""
     at = np.clip(steps, 0, len(sizes) - 1)
     low = np.minimum(at.astype(np.intp), len(sizes) - 2)
     places = np.arange(sizes.shape[1])
@@ -301,8 +301,8 @@ def agree(said: list[Reals]) -> tuple[list[int], float]:
 def weigh_bands(said: list[Reals]) -> float:
     """Return a factor of the confidence, which is lower if one band measures a wider range of sizes than another.
 
-    All bands measure the same few elements, so accidental changes of size look the same in all of them. But coarse
-    bands contain fewer patterns, so their range then differs.
+    All bands measure the same few elements, so random changes of size are the same in all bands. But coarse bands
+    contain fewer patterns, so a random change gives them another range than fine bands.
     """
     ranges = [max(float(a.std()), LEVEL) for a in said]
     return float(np.exp(-((np.log(max(ranges) / min(ranges)) / UNEVEN) ** 2))) if ranges else 1.0
@@ -315,7 +315,7 @@ def shape_of(
     size: tuple[int, int],
     sure: float,
 ) -> ScaleEstimate:
-    """Return the map of the agreed sizes: a plane if it is good enough, else a curved surface, else the masks."""
+    """Return the map of the agreed sizes: a plane if it fits well enough, else a curved surface, else from masks."""
     surface = fit(places, mean, size)
     every = tuple(np.indices(size).reshape(2, -1))
     curved = np.einsum("ni,i->n", list_terms((every[0], every[1]), size), surface).reshape(size)

@@ -19,14 +19,15 @@ __all__ = ["PlaneView"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlaneView:
-    """A plane in a photograph, as far as it is known. Missing facts are found in the photograph.
+    """The known facts about a plane in a photograph. Missing facts are found in the photograph.
 
     `texrs.rectify`, `texrs.extend` and `texrs.remove` accept a view, or only a `Plane`, as ``view``.
 
     Parameters
     ----------
     plane : Plane, optional
-        The plane. Default: the plane of ``corners`` or ``slant``, else it is found (`texrs.planes.find`).
+        The plane. Default: the plane of ``corners`` or ``slant`` if one is given, else the plane that
+        `texrs.planes.find` finds.
     corners : four of (row, column), optional
         Positions of the corners of a rectangle on the plane, in order around it.
     slant : float, optional
@@ -38,7 +39,7 @@ class PlaneView:
         Angle of view of the longer side of the photograph in degrees, 1 to 170 (`texrs.io.read_fov`). Commands use the
         angle that the file states, if any. Default: the angle that the corners determine, else 60.
     ground : (H, W) array, path or Mask, optional
-        Mask of the pixels that show the plane. Default: the pixels that are found (`texrs.planes.find_ground`), or all
+        Mask of the pixels that show the plane. Default: the pixels that `texrs.planes.find_ground` finds, or all
         pixels if the plane is given and the photograph is rectified or extended.
 
     Raises
@@ -84,7 +85,7 @@ class PlaneView:
 
     @classmethod
     def of(cls, given: PlaneView | Plane | Sequence[PlaneView | Plane] | None) -> PlaneView:
-        """Return a view, from a view, a plane, or None for a view without known facts.
+        """Return a view: the given view, a view of the given plane, or a view without known facts for None.
 
         Parameters
         ----------
@@ -98,7 +99,7 @@ class PlaneView:
         Raises
         ------
         InvalidInput
-            If it is another type, or a sequence of planes. Only one plane can be rectified at a time.
+            If `given` is of another type, or a sequence of planes. Only one plane can be rectified at a time.
 
         Examples
         --------
@@ -116,7 +117,7 @@ class PlaneView:
         return given
 
     def settle(self, shape: Sequence[int]) -> tuple[Plane | None, Bools | None]:
-        """Return the plane and the ground in a photograph, as far as they are known.
+        """Return the known plane and the known ground of a photograph.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """Generated images and volumes whose elements, masks, scale and deformation are known exactly.
 
-Each generator draws a texture as a small photograph would show it: a relief under a sun and a sky, with sensor noise.
-Colours vary within and between elements. A generator returns the image with the positions and pixels of all
+Each generator draws a texture as it would appear in a small photograph: a relief lit by a sun and a sky, with sensor
+noise. Colours vary within and between elements. A generator returns the image with the positions and pixels of all
 elements, the scale map and the Jacobians. The tests and pages of texrs use these samples. They are CC0, so use them as
 you like.
 
@@ -145,19 +145,20 @@ def load(name: str, **options: Any) -> Sample:
     name : str
         One of `names` or `photographs`.
     **options
-        Arguments of the generator: `size`, `seed`, and `wrap` if the generator has it. A photograph does not take any.
+        Arguments of the generator: `size`, `seed`, and `wrap` if the generator has it. A photograph does not accept
+        options.
 
     Returns
     -------
     Sample
-        For a photograph, only the image is known.
+        The sample. A photograph has only an image.
 
     Raises
     ------
     InvalidInput
-        The name is unknown, a photograph is given options, or the generator rejects a value.
+        If the name is unknown, a photograph is given options, or the generator rejects a value.
     TypeError
-        The generator does not have such an option.
+        If the generator does not have such an option.
 
     Examples
     --------

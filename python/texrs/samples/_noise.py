@@ -51,7 +51,7 @@ def clouds(
     coarse, fine : float
         Longest and shortest wavelength, in samples.
     gain : float
-        Ratio of the amplitude of an octave to that of the next coarser octave.
+        Ratio of the amplitude of an octave to the amplitude of the next coarser octave.
     stretch : sequence of float, optional
         Factor that stretches the noise along each axis. Default: 1 for each.
 
@@ -148,7 +148,7 @@ def scatter(period: tuple[int, int], rng: np.random.Generator, spacing: float, a
     spacing : float
         Side of a square, in pixels, for which 40 darts are thrown.
     apart : float
-        Smallest distance between two points, in pixels.
+        Minimum distance between two points, in pixels.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def light(
     ambient : float
         Strength of the sky.
     exposure : float
-        Factor on the result.
+        Factor that multiplies the result.
 
     Returns
     -------

@@ -38,18 +38,18 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     size : (int, int)
         Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Seed of the tiles. The plane is always the same. Default: 0.
+        Seed of the tiles. The plane does not depend on it. Default: 0.
 
     Returns
     -------
     Sample
-        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the image of the disc's centre on
-        the plane. It is near the centroid of the visible disc, but not equal to it.
+        It has `centres`, `labels`, `mask`, `scale_map` and `jacobians`. A centre is the disc's centre on the plane,
+        projected into the image. It is near the centroid of the visible disc, but not equal to it.
 
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -71,14 +71,14 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
 def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     """Generate a wall of bricks that recedes obliquely.
 
-    On the plane, it is the wall of `bricks` at 0.8 times its size. The layout is "jointed".
+    The wall on the plane is the wall of `bricks` at 0.8 times its size. The layout is "jointed".
 
     Parameters
     ----------
     size : (int, int)
         Rows and columns, at least 32. Default: (256, 256).
     seed : int
-        Seed of the bricks. The plane is always the same. Default: 0.
+        Seed of the bricks. The plane does not depend on it. Default: 0.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -152,7 +152,7 @@ class _Plane:
         return replace(plane, corner=-low, extent=high - low)
 
     def pixels(self, pitch: float = 1.0) -> NDArray[np.float64]:
-        """Return the coordinates of samples of the image, every `pitch` pixels, (H, W, 2)."""
+        """Return the coordinates of samples of the image, one every `pitch` pixels, (H, W, 2)."""
         axes = [np.arange(0, n - 1 + pitch / 2, pitch) for n in self.size]
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
 
@@ -163,7 +163,7 @@ class _Plane:
         return p, 1 - transform(p, self.slope[:, None])[..., 0]
 
     def source(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the coordinates on the plane's texture that the pixels `at` (..., 2) show."""
+        """Return the coordinates on the plane's texture that are visible at the pixels `at` (..., 2)."""
         p, w = self._offset(at)
         return transform(p / w[..., None], self.zoom * self.stretch.T) + self.corner
 
@@ -190,7 +190,7 @@ class _Plane:
 
 
 def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
-    """Fill the torus of `scene` with a hexagonal lattice of round tiles in grout."""
+    """Fill the torus of `scene` with a hexagonal lattice of round tiles, separated by grout."""
     rng = scene.rng
     sand, cloud = scene.noise(3, 1, gain=1.0), scene.noise(40, 2, gain=0.7)
     scene.height += np.float32(0.14) * sand
@@ -216,7 +216,7 @@ def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
 
 
 def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Sample:
-    """Render the lit `scene` as seen through the map `plane`."""
+    """Render the lit `scene` as it appears through the map `plane`."""
     from scipy import ndimage
 
     lit = scene.picture(grain=0.0, reach=6.0, exposure=0.95)

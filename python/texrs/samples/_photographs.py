@@ -1,4 +1,4 @@
-"""The photographs that come with scikit-image, under the names that they have there.
+"""The photographs that come with scikit-image, under their names in scikit-image.
 
 All of them are part of the scikit-image package, so nothing is downloaded. Scikit-image names these sources: brick and
 gravel from CC0Textures and grass from DeviantArt (CC0); coffee by Rachel Michetti (CC0); rocket by SpaceX and
@@ -17,7 +17,7 @@ PHOTOGRAPHS = ("brick", "coffee", "coins", "grass", "gravel", "hubble_deep_field
 
 
 def photograph(name: str) -> Sample:
-    """Return a photograph of scikit-image. Its result has only an image.
+    """Return a photograph of scikit-image, as a sample that has only an image.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def photograph(name: str) -> Sample:
     Raises
     ------
     InvalidInput
-        There is no photograph of that name.
+        If there is no photograph of that name.
 
     Examples
     --------

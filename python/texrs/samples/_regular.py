@@ -18,7 +18,7 @@ _COURSE, _BRICK, _JOINT = 34, 80, 5.0
 def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate a wall of bricks in running bond, whose mortar is a rigid, connected background.
 
-    An image of the default size has exactly 21 vertical joints wholly inside, for every seed. There are three in each of
+    An image of the default size has exactly 21 complete vertical joints, for every seed. There are three in each of
     the seven courses that the border does not cut. The layout is "jointed".
 
     Parameters
@@ -39,7 +39,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -258,8 +258,9 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
 def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate a close view of a plain weave of two yarns.
 
-    An element is a float: the visible part of a yarn that passes over the other yarn. It is the weft at crossings
-    whose row and column numbers add up to an even number, else the warp. The gaps between yarns are background.
+    An element is a float: the visible part of a yarn that passes over the other yarn. The weft is on top at crossings
+    whose row and column numbers add up to an even number, and the warp at the others. The gaps between yarns are
+    background.
 
     Parameters
     ----------
@@ -279,7 +280,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -328,7 +329,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
 
 
 def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats, wear: Floats) -> None:
-    """Lay a two-ply rope from `knot` along `span`, with the label -1 of the net."""
+    """Draw a two-ply rope from `knot` along `span`, with the label -1 of the net."""
     length = float(np.hypot(*span))
     window = scene.window((knot[0] + span[0] / 2, knot[1] + span[1] / 2), length / 2 + 5)
     rows, cols = window.where
@@ -345,7 +346,7 @@ def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Fl
 
 
 def _label_cells(scene: Scene, cells: Sequence[tuple[float, float]]) -> None:
-    """Label each hole in the net (label -1) with the number of the cell whose middle is in it."""
+    """Label each hole in the net (label -1) with the number of the cell whose middle is in the hole."""
     from scipy import ndimage
 
     parts = np.zeros(scene.shape, np.int32)

@@ -33,13 +33,13 @@ class Sample:
     image : uint8 array, (H, W, 3) or (D, H, W, 3); a grey photograph is (H, W)
         The image, in sRGB.
     centres : float64 array, (N, 2) or (N, 3), or None
-        Centroids of the elements, in pixels. The centroid is that of the whole visible element, before the border of
-        the image cuts it. The tilted samples give the image of the centroid on the plane instead.
+        Centroids of the elements, in pixels. A centroid is computed from the visible element before the border of the
+        image cuts it. For the tilted samples, it is the centroid on the plane, projected into the image.
     labels : int32 array, (H, W) or (D, H, W), or None
         Label of each pixel: 0 for background, ``i + 1`` for the element of ``centres[i]``. A visible element whose
-        centre is outside the image has a label above N, so ``labels > N`` selects the elements that are mostly outside.
-        With `wrap` there are none: an element that crosses the border continues on the opposite side with
-        the same label.
+        centre is outside the image has a label above N, so ``labels > N`` selects the elements that are mostly
+        outside. With `wrap`, no label is above N: an element that crosses the border continues on the opposite side
+        with the same label.
     mask : bool array, (H, W) or (D, H, W), or None
         The foreground. It is ``labels > 0``, unless the generator documents another rule.
     layout : {"disjoint", "connected", "jointed"} or None

@@ -17,8 +17,8 @@ from texrs.samples._scene import Scene, Window
 def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate separate rounded stones of many colours on dark sand.
 
-    The stones are the cells of a Voronoi diagram, with rounded corners, and shrunk until sand shows between them. No
-    two touch. The layout is "disjoint".
+    The stones are the cells of a Voronoi diagram, with rounded corners, and shrunk until sand is visible between them.
+    Stones never touch. The layout is "disjoint".
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
 def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Generate separate sewing buttons of distinct colours on paper.
 
-    A button is a disc with a radius of 9 to 13 pixels. Its holes belong to it. No two buttons touch. The layout is
+    A button is a disc with a radius of 9 to 13 pixels, including its holes. Buttons never touch. The layout is
     "disjoint".
 
     Parameters
@@ -117,7 +117,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -237,7 +237,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -282,7 +282,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
 
 
 def _lay_sand(scene: Scene) -> None:
-    """Lay dark sand over the whole scene."""
+    """Cover the whole scene with dark sand."""
     fine, soft = scene.noise(3, 1, gain=1.0), scene.noise(40, 4)
     scene.height += np.float32(0.3) * fine + np.float32(0.35) * soft
     scene.albedo[:] = shades(ramp(scene.noise(4, 1, gain=1.0), -0.6, 2.6), "423a30", "776a56")
@@ -310,7 +310,7 @@ def _lay_leaf(
     mottle: Floats,
     crinkle: Floats,
 ) -> None:
-    """Lay one pointed leaf with a midrib and veins, visible where it is higher than the scene."""
+    """Draw one pointed leaf with a midrib and veins, visible where it is higher than the scene."""
     rows, cols = window.where
     u = (cos(angle) * window.y + sin(angle) * window.x) / np.float32(length) + 0.5
     v = (cos(angle) * window.x - sin(angle) * window.y) / np.float32(length)
@@ -330,7 +330,7 @@ def _lay_leaf(
 
 
 def _lay_flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floats, crinkle: Floats) -> None:
-    """Lay one flower of 5 to 8 petals over the scene, as a new element."""
+    """Draw one flower of 5 to 8 petals over the scene, as a new element."""
     rng, label = scene.rng, scene.add(centre)
     window = scene.window(centre, 22)
     rows, cols = window.where

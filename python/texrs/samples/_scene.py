@@ -1,4 +1,4 @@
-"""The scene that a planar sample is laid out, lit and photographed in.
+"""The scene of a planar sample, which is laid out, lit and photographed.
 
 A scene is always a torus with two samples per pixel along each axis. A tileable sample is the whole torus. Any other
 sample is cut out of a larger torus, so elements enter across the border as in a photograph. Even samples are at pixel
@@ -118,7 +118,7 @@ class Scene:
         gloss: float | Floats = 0.0,
         over: bool = False,
     ) -> None:
-        """Paint the samples that are `inside` and higher than the scene, or all that are `inside` if `over`."""
+        """Paint the samples that are `inside` and higher than the scene, or all `inside` samples if `over`."""
         rows, cols = window.where
         shown = inside if over else inside & (height > self.height[rows, cols])
         where = np.nonzero(shown)

@@ -20,7 +20,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     """Generate gently folded layers, 9 voxels apart.
 
     Voxel p has the colour of flat layers at S(p) = p + d(p), where d is a sum of four slow waves. The normal of the
-    flat layers is the axis of planes. `mask` is the dark half of each layer: S_0 modulo 9 in 0 to 4.5.
+    flat layers is the axis of planes. `mask` marks the dark half of each layer, where S_0 modulo 9 is 0 to 4.5.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -74,7 +74,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
 def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     """Generate sparse ellipsoids of three colours in grey stone, periodic along every axis.
 
-    No two ellipsoids touch. The colour of ``centres[i]`` is colour ``i % 3`` of red, ochre and blue. The layout is
+    Ellipsoids never touch. The element of ``centres[i]`` has colour ``i % 3`` of red, ochre and blue. The layout is
     "disjoint".
 
     Parameters
@@ -92,7 +92,7 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     """Generate layers of plain-woven yarn in resin.
 
     Yarns run along rows and along columns, 16 voxels apart, and pass over and under each other. The layers are 16
-    planes apart. `mask` is the yarn.
+    planes apart. `mask` marks the yarn.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
 def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     """Generate wood: growth rings around a pith outside the block, and fibres along the axis of rows.
 
-    `mask` is the dark late wood.
+    `mask` marks the dark late wood.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------

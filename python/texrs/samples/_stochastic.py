@@ -33,7 +33,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Raises
     ------
     ValueError
-        `size` or `seed` is out of its range.
+        If `size` or `seed` is out of its range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The scale map of an oblique plane, from its angles (equations 3 and 4)."""
+"""The scale map of an oblique plane, from its angles (equations 3 and 4 of Dong, Zhou and Paul)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     """Return the scale map of an oblique plane.
 
     The size of elements falls linearly with distance along the slope in the image. Without ``fov``, the slant alone
-    determines the range: 1 / cos(slant) in the nearest corner and cos(slant) in the farthest [1]_. Three corrections
-    are made to the paper. Equation 4 begins with the largest scale, not with a coordinate. The middle of the image is
-    (size - 1) / 2. The extreme corners are chosen by the tilt, whichever way it points.
+    determines the range: 1 / cos(slant) in the nearest corner and cos(slant) in the farthest corner [1]_. Three errors
+    of the paper are corrected. Equation 4 begins with the largest scale, not with a coordinate. The middle of the
+    image is (size - 1) / 2. The nearest and farthest corners depend on the tilt, for tilts of any angle.
 
     With ``fov``, the map is that of a pinhole camera: it is 1 in the middle, and its range grows with the angle of
     view. The range is usually larger than without ``fov``. If the slant is 45 degrees, the nearest elements are 2x as
@@ -40,7 +40,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
         Angle between the line of sight and the plane's normal, in degrees: 0 (seen from the front) to 85.
     tilt : float
         Direction of increasing depth in the image, in degrees counter-clockwise from +x with y up: 90 for a ground
-        plane. Any angle is valid. The angle of the paper is 90 - tilt.
+        plane. Any angle is valid. The paper's angle is 90 - tilt.
     fov : float, optional
         Angle of view of the longer side of the image, in degrees, 1 to 170. Default: unknown, so that the slant alone
         determines the map.
@@ -53,7 +53,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     Raises
     ------
     InvalidInput
-        An angle is outside its range, or the plane's horizon is inside the image.
+        If an angle is outside its range, or the plane's horizon is inside the image.
 
     References
     ----------
@@ -114,7 +114,7 @@ def slant_for_ratio(ratio: float) -> float:
     Raises
     ------
     InvalidInput
-        The ratio is outside its range.
+        If the ratio is outside its range.
 
     Examples
     --------

@@ -19,11 +19,11 @@ _DETAIL = 1 / 400
 """Default size of the smallest feature, as a share of the shorter side; at least one pixel."""
 _ROUNDS = 6
 _RANGE = 2
-"""Range of scales in octaves: elements may be this much smaller or larger than the normal size."""
+"""Range of scales in octaves: elements may be smaller or larger than the normal size by a factor of up to 4."""
 _LIGHT = 0.25
 """Minimum variance of lightness, as a share of the variance along the axis of colour that varies most.
 
-Below it, that axis is used instead.
+If lightness varies less, features are detected along that axis instead.
 """
 _FLAT = 1e-4
 """Standard deviation of colours in 0 to 1 below which an image is treated as uniform."""
@@ -48,8 +48,8 @@ def auto_mask(
     trend : {"plane", "linear", "quadratic", "none"}
         Model that the scales follow during detection, as in `from_mask`. Default: "plane".
     known : array_like of bool, optional
-        Pixels that show the texture, (H, W). Other pixels do not count as surroundings, and are not in the mask.
-        Default: all.
+        Mask of the pixels that show the texture, (H, W). Other pixels do not count as surroundings, and are not in the
+        result. Default: all.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def auto_mask(
     Raises
     ------
     InvalidInput
-        The image has one colour, only noise without features, or a side below 16 pixels.
+        If the image has one colour, only noise without features, or a side below 16 pixels.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def _measure(mask: Bools, trend: Trend, known: Bools) -> Floats:
 
 
 def take_grey(colours: Floats, known: Bools) -> Floats:
-    """Return lightness, or the axis of colour that varies most if the colours differ mainly in hue."""
+    """Return lightness, or the values along the axis of colour that varies most if the colours differ mainly in hue."""
     light = np.asarray(colours.mean(-1), np.float32)
     if colours.shape[2] == 1:
         return light

@@ -27,7 +27,7 @@ def _choose_boxes(sigma: float) -> list[int]:
 
 
 def shrink(values: Floats, known: Bools, side: int) -> tuple[Floats, Bools]:
-    """Return the means of known values over cells of side x side pixels, and which cells contain known values."""
+    """Return the means of known values over cells of side x side pixels, and a mask of cells with known values."""
 
     def sums(of: Floats) -> Floats:
         rows = np.add.reduceat(of, np.arange(0, of.shape[0], side), axis=0)

@@ -63,7 +63,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     Raises
     ------
     InvalidInput
-        The array is not a scale map, or a step is not valid. The message names the step.
+        If the array is not a scale map, or a step is not valid. The message contains the number of the step.
 
     Examples
     --------

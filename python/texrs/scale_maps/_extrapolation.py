@@ -16,16 +16,16 @@ from texrs.scale_maps._trend import Trend, as_trend, follow_kind
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     """Continue a scale map into its holes and beyond its known part.
 
-    A trend is fitted to the known part and continues it. The difference between map and trend at the boundary of a
-    hole is spread over the hole like a membrane. The result therefore has no step at the boundary. It is clipped to a
-    quarter of the smallest and to four times the largest known scale.
+    A trend is fitted to the known part and evaluated at unknown pixels. The difference between map and trend at the
+    boundary of a hole is spread over the hole like a membrane. The result therefore has no step at the boundary. It is
+    clipped to a quarter of the smallest and to four times the largest known scale.
 
     Parameters
     ----------
     scale : array_like
         Scale map, (H, W). Its values at unknown pixels are ignored, even NaN.
     known : array_like of bool
-        Pixels where the map is valid, (H, W). Their values do not change.
+        Mask of the pixels where the map is valid, (H, W). Their values do not change.
     trend : {"plane", "linear", "quadratic", "none"}
         Model of the known part. ``"plane"``: a plane in perspective, whose widths vary linearly in the image.
         ``"linear"``: log S varies linearly. ``"quadratic"``: log S varies quadratically, for curved surfaces.
@@ -39,7 +39,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     Raises
     ------
     InvalidInput
-        No pixel is known, the shapes differ, or known scales are not positive.
+        If no pixel is known, the shapes differ, or known scales are not positive.
 
     Examples
     --------

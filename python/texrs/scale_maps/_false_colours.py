@@ -31,8 +31,9 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
     scale : array_like
         Scale map, (H, W).
     encoding : {"log2", "paper"}
-        Formula of the grey levels. ``"log2"``: 128 + 64 log2(S), equally fine for small and large scales, from 1/4 to
-        3.96. ``"paper"``: 128 S, up to 1.99. Scales outside are clipped. Default: "log2".
+        Formula of the grey levels. ``"log2"``: 128 + 64 log2(S), with the same relative precision for small and large
+        scales, from 1/4 to 3.96. ``"paper"``: 128 S, up to 1.99. Scales outside the range are clipped. Default:
+        "log2".
 
     Returns
     -------
@@ -42,7 +43,7 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
     Raises
     ------
     InvalidInput
-        The array is not a scale map, or the encoding is unknown.
+        If the array is not a scale map, or the encoding is unknown.
 
     Examples
     --------
@@ -81,7 +82,7 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     Raises
     ------
     InvalidInput
-        The image has colours or another dtype, or the encoding is unknown.
+        If the image has colours or another dtype, or the encoding is unknown.
     LimitExceeded
         If decoding needs more memory than is available, or than `texrs.limits` allows.
 
@@ -122,8 +123,8 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
     scale : array_like
         Scale map, (H, W).
     largest : float, optional
-        Scale at the top of the bar, 1.1 to 64. The bottom is its inverse. Give it to compare maps. Default: chosen
-        from the range of the map.
+        Scale at the top of the bar, 1.1 to 64. The scale at the bottom is its inverse. Pass the same value for maps
+        that are compared. Default: chosen from the range of the map.
 
     Returns
     -------
@@ -133,7 +134,7 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
     Raises
     ------
     InvalidInput
-        The array is not a scale map, or ``largest`` is outside its range.
+        If the array is not a scale map, or ``largest`` is outside its range.
 
     Examples
     --------
@@ -168,7 +169,7 @@ def _colour(at: Floats) -> Floats:
 
 
 def _mark_contours(levels: Floats) -> NDArray[np.bool_]:
-    """Mark the pixels whose right or lower neighbour is on the other side of an integer level."""
+    """Mark the pixels whose right or lower neighbour is on the other side of an integer value."""
     cells = np.floor(levels)
     marked = np.zeros(levels.shape, np.bool_)
     marked[:-1] |= cells[:-1] != cells[1:]

@@ -15,9 +15,9 @@ from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE
 __all__ = ["as_jacobians", "jacobians_of_coordinates", "jacobians_of_normals", "measure_sizes"]
 
 STEEPEST = 0.15
-"""Minimum z of a normal, 81 degrees of slant. A surface that is steeper is seen only as an edge."""
+"""Minimum z of a normal, which is a slant of 81 degrees. A steeper surface is visible only as an edge."""
 JUMPS = 3.0
-"""Ratio of the steps to both neighbours above which the longer step leads to another part of the surface."""
+"""Ratio of the steps to both neighbours above which the longer step crosses to another part of the surface."""
 WORST = 100.0
 """Largest foreshortening of a surface: the ratio of the singular values of its Jacobian."""
 
@@ -30,7 +30,8 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
     Raises
     ------
     InvalidInput
-        The shape is wrong, values are not finite, or matrices are flat or have scales outside the range.
+        If the shape is wrong, values are not finite, or matrices are foreshortened too much or have scales outside the
+        range.
 
     """
     given = as_array(value, name, np.float64, ("rows", "columns", 2, 2))
@@ -47,7 +48,7 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
 
 
 def find_flat(jacobians: Jacobians) -> Bools:
-    """Return which matrices are flat, or have scales outside the range."""
+    """Mark the matrices whose foreshortening or scales are outside the range."""
     area, squares = np.abs(measure_determinants(jacobians)), (jacobians * jacobians).sum(axis=(-2, -1))
     # If the singular values differ much, their ratio is about the sum of squares over the determinant.
     return np.asarray((area < MAX_SCALE**-2) | (area > MIN_SCALE**-2) | (squares > WORST * area), np.bool_)
@@ -68,16 +69,16 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     """Return the Jacobians of a curved surface seen from far away, from its normals.
 
     A surface is foreshortened by the cosine of its slant, along the slope. Across the slope, elements keep their size.
-    The texture is not rotated: horizontal lines stay horizontal, as on a cloth that is laid on the surface. For a
-    surface that can be unrolled along its axis, such as a cylinder, this is how a flat texture wraps around it.
-    For others, such as a ball, it is an approximation.
+    The texture is not rotated: horizontal lines stay horizontal, as on a cloth that is laid on the surface. If the
+    surface can be unrolled along its axis, as a cylinder can, the result is exact. For other surfaces,
+    such as a ball, it is an approximation.
 
     Parameters
     ----------
     normals : (rows, columns, 3) array
         Normals: x to the right, y up, z towards the viewer. Integers mean 2 v - 1, as in a normal map. Floats that are
         never negative and do not have length 1 are decoded in the same way. Zeros and NaN mark pixels without a
-        surface, which count as seen from the front.
+        surface, which are treated as seen from the front.
     green : {"up", "down"}
         Direction of y: "up" (OpenGL) or "down" (DirectX). Default: "up".
 
@@ -91,7 +92,7 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     Raises
     ------
     InvalidInput
-        The shape is wrong, or no pixel shows a surface.
+        If the shape is wrong, or no pixel shows a surface.
 
     Examples
     --------
@@ -134,7 +135,7 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
 
 
 def _are_unit(vectors: NDArray[np.float64]) -> bool:
-    """Return whether most vectors other than zero have length 1."""
+    """Return True if most vectors other than zero have length 1."""
     length = np.sqrt((vectors * vectors).sum(axis=-1))
     there = length[np.isfinite(length) & (length > 1e-3)]
     return there.size > 0 and abs(float(np.median(there)) - 1) < 0.02
@@ -160,7 +161,7 @@ def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
     Raises
     ------
     InvalidInput
-        The shape is wrong, there are fewer than two rows or columns, or no pixel shows a surface.
+        If the shape is wrong, there are fewer than two rows or columns, or no pixel shows a surface.
 
     Examples
     --------

@@ -14,8 +14,7 @@ from texrs.scale_maps._maps import MIN_SCALE, as_map
 __all__ = ["AREAS", "Kind", "ScaleMap", "as_kind", "describe_kind", "find_kind", "keep_kind", "parse_kind"]
 
 Kind: TypeAlias = Literal["width", "area"]
-"""Kind of a scale map: widths across the slope of an oblique plane, or square roots of areas (their power 3/2).
-"""
+"""Kind of a scale map: widths across the slope of an oblique plane, or square roots of areas (their power 3/2)."""
 
 KINDS: tuple[Kind, Kind] = ("width", "area")
 AREAS = 2 / 3
@@ -23,7 +22,7 @@ AREAS = 2 / 3
 KEEPS = frozenset({"multiply", "divide", "minimum", "maximum", "clip"})
 """Operations that keep the kind of a map if all other operands are scalars."""
 TITLE = "scale map: "
-"""Prefix of the kind in the description field of a file."""
+"""Text before the kind in the description field of a file."""
 
 
 class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
@@ -45,7 +44,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
     Raises
     ------
     InvalidInput
-        The array is not a scale map, or the kind is unknown.
+        If the array is not a scale map, or the kind is unknown.
 
     Examples
     --------
@@ -129,7 +128,7 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         Raises
         ------
         InvalidInput
-            The kind is unknown.
+            If the kind is unknown.
 
         Examples
         --------
@@ -162,7 +161,7 @@ def keep_kind(made: Floats, kind: Kind | None) -> Floats:
 
 
 def describe_kind(scale: object) -> str | None:
-    """Return the description for the file of a map: its kind, or None."""
+    """Return the text with the kind of a map for the description field of its file, or None."""
     kind = find_kind(scale)
     return None if kind is None else TITLE + kind
 

@@ -1,4 +1,4 @@
-"""The range of scale maps, and their checks."""
+"""The range of scales in a map, and checks of scale maps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
     Raises
     ------
     InvalidInput
-        The shape is not (rows, columns) or not ``shape``, or scales are not finite or outside `MIN_SCALE` to
+        If the shape is not (rows, columns) or not ``shape``, or scales are not finite or outside `MIN_SCALE` to
         `MAX_SCALE`.
 
     """

@@ -1,4 +1,4 @@
-"""Scale maps measured from a mask of features (equations 1 and 2)."""
+"""Scale maps measured from a mask of features (equations 1 and 2 of Dong, Zhou and Paul)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _MEASURES = ("boundary", "skeleton", "count", "area")
 SMALLEST = 16
 """Minimum side of an image, and of a window, in pixels."""
 _PERIODS = 8
-"""Default side of a window, in spacings of the features.
+"""Default side of a window, as a multiple of the spacing of the features.
 
 It then contains about 64 features, whose number is known to about 10 %.
 """
 _FEWEST = 6
-"""Minimum number of features in a mask, as its area over the square of their spacing."""
+"""Minimum number of features in a mask, estimated as its area divided by the square of their spacing."""
 _WIDEST = 4.0
-"""Largest ratio of the scale in a window to the typical scale, or of the typical scale to it."""
+"""Maximum ratio between the scale in a window and the typical scale, in either direction."""
 _ROUNDS = 4
 _PAPER_WINDOW, _PAPER_SIZE = 32, 9
 
@@ -57,8 +57,8 @@ def from_mask(
         Quantity to measure. ``"boundary"``: the length of the outlines. Features and gaps may be swapped.
         ``"skeleton"``: the length of the features' centre lines, if they are curves. ``"count"``: the number of
         features, if the mask is clean and elements do not touch. ``"area"``: the number of mask pixels in windows of
-        32 pixels, by the equations of the paper as printed. They suit only drawn curves, and give the reciprocal scale
-        there. For areas, the covered share of a window does not depend on their size. Default: "boundary".
+        32 pixels, by the equations of the paper as printed. This is only useful for drawn curves, and gives their
+        reciprocal scale. For areas, the covered share of a window does not depend on their size. Default: "boundary".
     window : int, optional
         Side of the windows in pixels, at least 16. Default: eight times the spacing of the features, at most a third
         of the shorter side.
@@ -71,8 +71,8 @@ def from_mask(
         False, it contains the square roots of areas, which are the power 3/2 of the widths on such a plane. Default:
         False.
     known : array_like of bool, optional
-        Pixels where the mask is valid, (H, W). Other pixels do not count in any window, and the map is continued into
-        them (`extend`). Default: all.
+        Mask of the valid pixels, (H, W). Other pixels do not count in any window, and the map is continued into them
+        (`extend`). Default: all.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def from_mask(
     Raises
     ------
     InvalidInput
-        The mask is empty or full, has too few features to measure, or has a side below 16 pixels.
+        If the mask is empty or full, has too few features to measure, or has a side below 16 pixels.
 
     References
     ----------
@@ -223,7 +223,7 @@ def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
 
 
 def _measure_as_printed(mask: Bools, known: Bools | None, window: int | None) -> Floats:
-    """Return log S from equations 1 and 2 as printed: zeros outside the image, and larger scales if more is marked."""
+    """Return log S from equations 1 and 2 as printed: zeros outside the image, larger scales where more is marked."""
     from scipy import ndimage
 
     marked = (mask if known is None else mask & known).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Measurement of a scale map without a user: detect a mask of features, then measure it."""
+"""Measurement of a scale map without user input: detect a mask of features, then measure it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from texrs.scale_maps._mask import from_mask
 from texrs.scale_maps._trend import Trend, as_trend
 
 LARGEST_DETAIL = 4096.0
-"""Largest size of the smallest feature, in pixels. Each image also limits it to a quarter of its shorter side."""
+"""Upper limit of `min_feature_size`, in pixels. Each image also limits it to a quarter of its shorter side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Measuring:
     Raises
     ------
     InvalidInput
-        A value is outside its range.
+        If a value is outside its range.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Measuring:
         image : (H, W) or (H, W, C) array_like
             Image, with sides of at least 16.
         known : (H, W) bool array, optional
-            Pixels that show the texture. Default: all.
+            Mask of the pixels that show the texture. Default: all.
 
         Returns
         -------
@@ -72,7 +72,7 @@ class Measuring:
         Raises
         ------
         InvalidInput
-            The image has no features, or is too small for ``min_feature_size``.
+            If the image has no features, or is too small for ``min_feature_size``.
 
         Examples
         --------

@@ -35,7 +35,7 @@ def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
 
 
 def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
-    """Return how much each pixel belongs to a region: 1 well inside, 0.5 at the edge, 0 well outside.
+    """Return the weight of each pixel in a region: 1 well inside, 0.5 at the edge, 0 well outside.
 
     A region is a rectangle [top, left, bottom, right], a disc [row, column, radius], or a polygon of at least three
     points [row, column]. None is the whole map. The edge is ``feather`` pixels wide.

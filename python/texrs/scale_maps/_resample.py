@@ -40,7 +40,7 @@ def resample(
         output, crop the middle. ``"user"``: stretch ``pattern``. ``"angles"``: the map of a plane with the given
         angles (`from_angles`). Default: "stretch".
     pattern : array_like, optional
-        Scales for the mode ``"user"``, of any shape (R, C).
+        Scales for the mode ``"user"``, an array of any shape (R, C).
     slant, tilt, fov : float, optional
         Angles of the plane for the mode ``"angles"``, in degrees.
 
@@ -52,7 +52,7 @@ def resample(
     Raises
     ------
     InvalidInput
-        The array is not a scale map, or an argument that the mode needs is missing.
+        If the array is not a scale map, or an argument that the mode needs is missing.
 
     Examples
     --------

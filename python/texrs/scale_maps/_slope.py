@@ -37,13 +37,13 @@ class Slope:
     scale, slope : float
         S at x_0, and its increase along d per pixel.
     down, across : (float, float)
-        Directions d and e, (row, column).
+        Unit vectors d and e, (row, column).
     least, largest : float
         Smallest and largest S in the image.
     residual : float
         Root mean square difference between the logarithms of the map and of the plane.
     power : float
-        Power of the scale map that S is.
+        Power of the scale map that gives S.
     lean : float
         Cosine of the slant, if known. The plane is 1 / lean times as long as it appears in the middle.
     rotation : float
@@ -161,8 +161,9 @@ class Slope:
         scales : (rows, columns) float array
             Requested scales.
         other : Slope, optional
-            Plane along whose slope the scales grow. Its lines run to its own vanishing point, and its upright is the
-            upright of this plane. Default: each point is seen as if straight ahead, along the slope of this plane.
+            Plane along whose slope the scales grow. Lines converge to the vanishing point of this other plane, and the
+            upright direction is that of the present plane. Default: each point is seen as if straight ahead, along the
+            slope of the present plane.
         foreshortened : float
             Power of the foreshortening of this plane to apply. Default: 1.
         """

@@ -38,8 +38,8 @@ def as_trend(value: object) -> str:
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     """Fit a trend robustly to the known logarithms of a map, and return its logarithms at every pixel.
 
-    The result is clipped to a quarter of the smallest and to four times the largest known scale. Closer to the
-    horizon, nothing is visible. The trend "none" is the median.
+    The result is clipped to a quarter of the smallest and to four times the largest known scale. Nothing is visible
+    closer to the horizon. The trend "none" is the median.
     """
     size = logs.shape
     places = _thin_out(np.ones(size, np.bool_) if known is None else known)
@@ -68,7 +68,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
 
 
 def follow_kind(logs: Floats, trend: str, kind: Kind | None, known: Bools | None = None) -> Floats:
-    """Fit a trend as `follow` does, but convert areas first, because only widths are linear on a plane."""
+    """Fit a trend as `follow` does, but convert areas to widths first: only widths are linear on a plane."""
     if trend != "plane" or kind != "area":
         return follow(logs, trend, known)
     return follow(logs * np.float32(AREAS), trend, known) / np.float32(AREAS)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Bools, Floats
 
 _ACROSS = 9
-"""Cells across a window; odd, so that one cell is in the middle."""
+"""Number of cells across a window. It is odd, so that one cell is in the middle."""
 _LEAST_AREA = 1 / 6
 """Minimum share of a window that must be known. Windows at the corners of the image are at least 1/4 inside."""
 
@@ -31,7 +31,7 @@ class Lattice:
     cell : int
         Side of a cell, in pixels.
     across : int
-        Number of cells across a window; odd.
+        Number of cells across a window. It is odd.
 
     """
 
@@ -55,17 +55,17 @@ class Lattice:
         features : (H, W) array of small whole numbers
             Features to count at each pixel.
         known : (H, W) array of bool, optional
-            Pixels that count as area. Default: all.
+            Mask of the pixels that count as area. Default: all.
 
         Returns
         -------
         densities : (R, C) array
             Features per known pixel of the window around each cell.
         enough : (R, C) array of bool
-            Cells whose windows are known well enough.
+            Mask of the cells whose windows are known well enough.
         rows, columns : (R, C) arrays
-            Distance, in pixels, from the centroid of the window's known part to the centre of the cell. It is not 0
-            near borders and holes, where only one side of the window is known.
+            Offset, in pixels, from the centroid of the window's known part to the centre of the cell. It is not 0 near
+            borders and holes, where only one side of the window is known.
 
         """
         area = self._sum_cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))

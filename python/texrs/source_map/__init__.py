@@ -42,9 +42,9 @@ class SourceMap(Parted):
         Position in the exemplar, (row, column) or (plane, row, column), in samples whose centres are at integers.
         ``...`` is the shape of the output, and A is 2 or 3.
     exemplar : (...) uint16
-        Number of the exemplar.
+        Index, from 0, of the exemplar of each pixel.
     label : (...) uint32
-        Number of the patch.
+        Index, from 0, of the patch of each pixel.
     jacobian : None, (L, A, A) or (..., A, A) float32, or a field
         Jacobian J = dS/dp of each pixel's patch: None (the identity), a table by label, one matrix for each pixel, or
         a field of `texrs.fields`. A field is evaluated on demand. The inverse of J gives the directions of the
@@ -67,7 +67,7 @@ class SourceMap(Parted):
     """
 
     def __repr__(self) -> str:
-        """Return a short text with the size of the output and those of the exemplars."""
+        """Return a short text with the size of the output and the sizes of the exemplars."""
         into = ", ".join(" x ".join(map(str, s)) for s in self.shapes[:4]) + ", ..." * (len(self.shapes) > 4)
         jacobians = "" if self.jacobian is None else ", with Jacobians"
         return f"<SourceMap of {' x '.join(map(str, self.shape))} into {into}{jacobians}>"
@@ -126,7 +126,7 @@ class SourceMap(Parted):
         label: NDArray[np.uint32] | None = None,
         jacobian: NDArray[np.float32] | Frames | None = None,
     ) -> SourceMap:
-        """Return the map of an image or volume made from one exemplar.
+        """Return the map of an image or volume whose pixels come from one exemplar.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class SourceMap(Parted):
         shape : tuple of int
             Sides of the exemplar, without channels.
         label : (...) uint32 array, optional
-            Patch of each pixel. Default: one patch.
+            Index, from 0, of the patch of each pixel. Default: one patch.
         jacobian : (L, A, A) or (..., A, A) float32 array, or field, optional
             Jacobians, as in the attribute. Default: the identity.
 
@@ -235,8 +235,8 @@ class SourceMap(Parted):
         interpolation : {"cubic", "linear", "nearest"}
             Interpolation between samples. Use "nearest" for labels. Samples at integer coordinates are copied exactly.
         antialias : bool
-            If True, smooth the exemplar before sampling wherever the Jacobians shrink it. Not for labels. Has no
-            effect with "nearest". Default: False.
+            If True, smooth the exemplar before sampling wherever the Jacobians shrink it. Do not use it for labels. It
+            has no effect with "nearest". Default: False.
         map_type : {"colour", "normal", "vector", "slope"}
             Kind of the values. "colour": no vectors. "normal": a tangent-space normal map with channels x, y, z, where
             unsigned values mean 2 v - 1. Its vectors rotate with the local Jacobian. The third channel may be
@@ -360,8 +360,8 @@ class SourceMap(Parted):
         place : (rows, columns) of unsigned int
             Index of each pixel in the concatenation of all images, counted row by row.
         label : (rows, columns) uint32
-            Patch of each pixel. Pixels of different patches get different labels, even if they are neighbours in an
-            image.
+            Index of the patch of each pixel. Pixels of different patches get different labels, even if they are
+            neighbours in an image.
         overwrite : bool
             If True, write the labels of the result into ``label``, which saves 4 bytes a pixel. Default: False.
 
@@ -407,7 +407,7 @@ class SourceMap(Parted):
         return cls(*Pixels.chain(several).pick(place, label, out=label if overwrite else None), several[0].shapes)
 
     def is_coherent(self, axis: int, *, wrap: bool = False) -> Bools:
-        """Return which pixels continue in the exemplar to their next pixel along ``axis``.
+        """Mark the pixels whose next pixel along ``axis`` is also the next pixel in the exemplar.
 
         True if S(p + e) = S(p) + J(p) e within 0.1 samples, in the same exemplar. False means a seam. The last pixel
         of an axis that does not wrap is False.
@@ -415,7 +415,7 @@ class SourceMap(Parted):
         Parameters
         ----------
         axis : int
-            Number of the axis, from 0.
+            Index of the axis, from 0.
         wrap : bool
             If True, the last pixel of the axis is followed by the first. Default: False.
 
@@ -440,12 +440,12 @@ class SourceMap(Parted):
         return find_continued(self, as_int(axis, "axis", 0, self.axes - 1), wrap=as_bool(wrap, "wrap"))
 
     def reuse(self) -> CopyStatistics:
-        """Measure how much of the output is copied verbatim from the exemplars, and how large the copied pieces are.
+        """Measure how much of the output is copied verbatim from the exemplars, and how large the copied regions are.
 
         Returns
         -------
         CopyStatistics
-            Fractions of the output and of the exemplar, and the number of pieces.
+            Fractions of the output and of the exemplar, and the number of copied regions.
 
         Examples
         --------

@@ -15,7 +15,7 @@ from texrs.source_map._parts import Parted
 __all__ = ["find_shrinking", "gather_smoothed"]
 
 LEVELS = 2
-"""Number of smoothed images per octave of shrinking. Values between two of them are interpolated."""
+"""Number of smoothed images per octave of shrinking. Values between two smoothed images are interpolated."""
 OCTAVES = 5.0
 """Maximum shrinking in octaves. Beyond it, the image is not smoothed further."""
 STRAIGHT = 1.05
@@ -39,7 +39,7 @@ def gather_smoothed(
     images : sequence of array
         Sampled images, each (..., C) or without channels.
     coordinates, exemplar : (N, A) float32, (N) uint16
-        Position of each pixel, and number of its image.
+        Position of each pixel, and index of its image.
     shrunk : (N) float
         Factor by which lengths shrink at each pixel. Above 1, the output is smaller than the image.
     interpolation : str

@@ -1,4 +1,7 @@
-"""Options with which an image was rendered. A source map keeps them, so that other maps are rendered alike."""
+"""Options with which an image was rendered.
+
+A source map stores them, so that other maps are rendered with the same options.
+"""
 
 from __future__ import annotations
 
@@ -51,11 +54,11 @@ class RenderOptions:
     known : tuple of (h, w) bool, optional
         Masks of the pixels of each exemplar that may be read beyond a seam. Default: all.
     parts : (rows, columns) uint16, optional
-        Number of the region of each pixel. The border of two regions is not corrected. Default: one region.
+        Index of the region of each pixel. The border between two regions is not corrected. Default: one region.
     light : (int, int), optional
         Position (row, column) in the exemplar of the first output pixel, if the output extends the exemplar or fills
-        its holes. The low-frequency light of each region is divided out of the samples, and the light at their new
-        position is multiplied on. Default: samples keep their own light.
+        its holes. Samples are divided by the low-frequency light at their source, and multiplied by the light at their
+        new position. Default: the light of samples does not change.
     fade : (rows, columns) uint8, optional
         Weight of the samples, 0 to 255, where a filling fades into the exemplar of the same size. Default: 255
         everywhere.

@@ -126,8 +126,8 @@ class Parted(ABC):
         Returns
         -------
         SourceMap
-            A map with the same labels and exemplars. It has no render options, because the options of the whole do not
-            apply to a part (for example, masks of blended pixels).
+            A map with the same labels and exemplars. It has no render options, because the options of the whole output
+            do not apply to a part (for example, masks of blended pixels).
 
         Raises
         ------
@@ -179,7 +179,7 @@ class Parted(ABC):
         exemplars : array or sequence of arrays
             Images, as for `render`.
         chunks : int or sequence of int, optional
-            Samples of a block along each axis. Default: 512 for images, 128 for volumes.
+            Number of samples along each axis of a block. Default: 512 for images, 128 for volumes.
         **options
             Options of `render`.
 
@@ -290,7 +290,7 @@ class Parted(ABC):
 
 
 def _is_shape(value: object, axes: int) -> bool:
-    """Return whether a value is the shape of an exemplar with ``axes`` sides."""
+    """Return True if a value is the shape of an exemplar with ``axes`` sides."""
     return (
         isinstance(value, Sequence | np.ndarray)
         and getattr(value, "ndim", 1) > 0
@@ -301,7 +301,7 @@ def _is_shape(value: object, axes: int) -> bool:
 
 @dataclass(frozen=True)
 class _Lookups:
-    """Source of chunks that samples exemplars through a source map."""
+    """Computes chunks by sampling exemplars through a source map."""
 
     look_up: Callable[[Box], Array]
     channel: Channel

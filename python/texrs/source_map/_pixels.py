@@ -22,11 +22,11 @@ class Mapped(Protocol):
 
     @property
     def exemplar(self) -> NDArray[np.uint16]:
-        """Number of the exemplar of each pixel."""
+        """Index of the exemplar of each pixel."""
 
     @property
     def label(self) -> NDArray[np.uint32]:
-        """Patch of each pixel."""
+        """Index of the patch of each pixel."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -92,7 +92,7 @@ class Pixels:
 
     @property
     def turned(self) -> bool:
-        """True if some map has a Jacobian for each pixel."""
+        """True if at least one map has a Jacobian for each pixel."""
         return self.pixels is not None
 
     def places(self, point: NDArray[np.int64], which: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -155,12 +155,12 @@ class Pixels:
 
 
 def turn_places(jacobians: NDArray[np.float32], places: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """Return products of matrices and vectors, in double precision for the same reason as in `chain_jacobians`."""
+    """Return products of matrices and vectors, in double precision for the reason that `chain_jacobians` states."""
     return np.asarray(np.einsum("...ij,...j->...i", jacobians, places, dtype=np.float64), np.float32)
 
 
 def chain_jacobians(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return products of matrices. Double precision, because the last bit of BLAS results depends on the processor."""
+    """Return products of matrices, in double precision because the last bit of BLAS depends on the processor."""
     return np.asarray(np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64), np.float32)
 
 
@@ -190,7 +190,7 @@ def label_pieces(joined: Sequence[Bools], shape: tuple[int, ...]) -> tuple[int, 
     int
         Number of pieces.
     int32 array, (pixels,)
-        Number of the piece of each pixel.
+        Index of the piece of each pixel.
 
     """
     from scipy.sparse import coo_array
@@ -208,7 +208,7 @@ def label_pieces(joined: Sequence[Bools], shape: tuple[int, ...]) -> tuple[int, 
 def number_pairs(
     outer: NDArray[np.uint32], pixels: Pixels, place: NDArray[np.unsignedinteger], out: NDArray[np.uint32]
 ) -> NDArray[np.uint64]:
-    """Return the sorted pairs of outer and inner labels, and write the number of each pixel's pair to ``out``.
+    """Return the sorted pairs of outer and inner labels, and write the index of each pixel's pair to ``out``.
 
     A pair is outer * pixels.labels + inner, where inner is the label of the pixel at ``place``.
     """

@@ -1,4 +1,4 @@
-"""Measure how much of a synthesis is copied verbatim from its exemplars, and how large the copied pieces are."""
+"""Measure how much of a synthesis is copied verbatim from its exemplars, and how large the copied regions are."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["CopyStatistics", "find_continued", "measure_reuse"]
 
 @dataclass(frozen=True, slots=True)
 class CopyStatistics:
-    """How much of a synthesis is copied verbatim (see `SourceMap.reuse`).
+    """Amount of a synthesis that is copied verbatim (see `SourceMap.reuse`).
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class CopyStatistics:
     largest : float
         Area of the largest region copied in one piece, as a share of the area of the largest exemplar.
     regions : int
-        Number of such regions.
+        Number of regions that are copied in one piece.
 
     Examples
     --------
@@ -41,7 +41,7 @@ class CopyStatistics:
 
 
 def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
-    """Return which pixels continue in the exemplar to their next pixel along an axis."""
+    """Mark the pixels whose next pixel along an axis is also the next pixel in the exemplar."""
     joined = source.exemplar == np.roll(source.exemplar, -1, axis)
     jacobian = source.jacobian_array()
     # Compare one coordinate at a time, because the Jacobians of all pixels are many times the size of the image.
@@ -58,7 +58,7 @@ def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
 
 
 def measure_reuse(source: Parted) -> CopyStatistics:
-    """Return how much is copied verbatim from the exemplars, and how large the copied pieces are."""
+    """Return how much is copied verbatim from the exemplars, and how large the copied regions are."""
     joined = [np.delete(find_continued(source, axis), -1, axis) for axis in range(source.axes)]
     regions, region = label_pieces(joined, source.shape)
     largest = int(np.bincount(region).max())

@@ -20,10 +20,11 @@ SAMPLES = 1 << 14
 EXPLAINED = 0.75
 """Maximum error of a stored z, relative to the error of the mean z. Above it, the channel is not z.
 
-If the values are independent of x and y, the ratio is at least 1. For 8-bit normals of ordinary relief it is 0.1.
+If the values are independent of x and y, the ratio is at least 1. For 8-bit normals of ordinary relief, the ratio is
+0.1.
 """
 ROUNDING = 1e-3
-"""Rounding error that floats may have: that of half precision."""
+"""Maximum rounding error of floating-point values, which is the error of half precision."""
 
 
 def find_scale(dtype: np.dtype[Any], signed: bool) -> tuple[float, float]:
@@ -34,10 +35,10 @@ def find_scale(dtype: np.dtype[Any], signed: bool) -> tuple[float, float]:
 
 
 def stores_z(exemplars: Sequence[Array]) -> bool:
-    """Return whether the third channel of a normal map is z, so that the vectors have unit length.
+    """Return True if the third channel of a normal map is z, so that the vectors have unit length.
 
-    It is not z if there are two channels, or if the channel is constant or has other values. The z of unit vectors
-    follows from x and y, so the channel must be closer to it than a constant is.
+    The third channel is not z if it is missing, constant, or has other values. The z of unit vectors follows from x
+    and y, so the channel must be closer to this z than a constant is.
     """
     if any(e.shape[-1] < 3 or e.dtype == np.bool_ for e in exemplars):
         return False
@@ -145,7 +146,7 @@ def _turn_step(jacobians: NDArray[np.float64], step: NDArray[np.float64]) -> NDA
 
 
 def _turn_step_of_space(jacobians: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Do the same for three axes, where the columns of the adjugate are cross products of the rows of J."""
+    """Return the same for three axes, where the columns of the adjugate are cross products of the rows of J."""
     first, second, third = np.moveaxis(jacobians, -2, 0)
     columns = [np.cross(second, third), np.cross(third, first), np.cross(first, second)]
     turned = sum((step[..., k : k + 1] * column for k, column in enumerate(columns)), np.zeros(step.shape))
