@@ -38,7 +38,7 @@ pub struct Measures<const A: usize> {
     pub extent: f64,
     /// Distance between the histograms of the set and of the neighbours, 0 to 1, averaged along the border.
     pub contrast: f64,
-    /// Share of the border where this distance is below [`ALIKE`].
+    /// Share of the border where this distance is below `ALIKE`.
     pub alike: f64,
 }
 
