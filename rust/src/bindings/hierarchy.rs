@@ -74,7 +74,7 @@ pub(super) fn region_adjacency<'py>(
     ))
 }
 
-/// Starts and members of sets, and a value of each.
+/// Starts and members of the sets, and the strength of the border between the two parts of each set.
 type Candidates<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<u32>>,
@@ -186,7 +186,7 @@ pub(super) fn sum_regions<'py>(
     PyArray1::from_vec(py, found).reshape([sets.len(), columns])
 }
 
-/// Returns which of many sets are chosen, so that these are disjoint and worth most.
+/// Returns a flag for each set: whether it is chosen. The chosen sets are disjoint and have a large total worth.
 #[pyfunction]
 pub(super) fn choose_disjoint<'py>(
     py: Python<'py>,

@@ -5,7 +5,7 @@ use super::run;
 use crate::foundation::grid::Grid;
 use crate::kernels::reconstruction;
 
-/// Returns the largest image below a mask that a seed reaches.
+/// Dilates a seed repeatedly, limited by a mask after each step, until nothing changes.
 #[pyfunction]
 pub(super) fn reconstruct<'py>(
     py: Python<'py>,

@@ -4,9 +4,10 @@ use crate::engine::appearance::{CHANNELS, Colour};
 use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
-/// Draws choose among at least 1 / SHARE of the samples: the ones whose first values are nearest to the wanted value.
+/// A draw chooses among at least 1 / SHARE of the samples. Their first values are the nearest to the wanted value.
 const SHARE: usize = 25;
-/// A sample whose first value is this near to the wanted value counts as equally good.
+/// Maximum difference between the first value of a sample and the wanted value. Samples within it count as equally
+/// good.
 const ALIKE: i32 = 48;
 /// Cost of two unrelated windows, in the units of vectors. The stitcher divides the costs of a guide by it.
 pub(crate) const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
@@ -109,8 +110,8 @@ impl<'a> Guide<'a> {
         self
     }
 
-    /// Draws a sample whose value is near the wanted one at a point, by a random word. Returns none if draws ignore
-    /// the guide.
+    /// Draws a sample whose first value is near the value wanted at a point. `word` is a random number. Returns `None`
+    /// if draws ignore the guide.
     #[inline(always)]
     pub(crate) fn near(&self, point: usize, word: u32) -> Option<usize> {
         if self.order.is_empty() {

@@ -12,9 +12,9 @@ const CHUNK: usize = 4096;
 /// Computes the places S of a region from the places S' at half the resolution. With r = p mod 2 - 1/2, S(p) = 2 S'(p
 /// / 2) + 1/2 + J r.
 ///
-/// The halves are there because a parent is in the middle between its children. With identity frames, whole
+/// The terms 1/2 are needed because a parent is in the middle between its children. With identity frames, whole
 /// coordinates remain whole. The parents must include p / 2, rounded down, for every p of the world. Along periodic
-/// axes of odd length the last parent has three children.
+/// axes of odd length, the last parent has three children.
 ///
 /// Reference: Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005, section 3.1.
 pub fn upsample<const D: usize>(

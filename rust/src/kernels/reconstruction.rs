@@ -23,8 +23,8 @@ use crate::{Error, Result};
 /// Number of processed pixels between checks of the monitor.
 const BREATH: usize = 1 << 16;
 
-/// Returns the largest image below `mask` that `seed` reaches. The seed is first clamped to the
-/// mask.
+/// Returns the image that results from repeated dilation of `seed`, limited by `mask` after each step. The seed is
+/// first clamped to the mask.
 pub fn reconstruct(
     seed: &[f32],
     mask: &[f32],

@@ -2,8 +2,8 @@
 //!
 //! The method is by Lefebvre and Hoppe, *Appearance-space texture synthesis*, SIGGRAPH 2006. A window of (2 r + 1)^D
 //! colours, weighted by a Gaussian, is projected onto its leading principal components. Colours, components and
-//! vectors are integers of 12 bits. So a vector does not depend on how its window was assembled, and distances are
-//! exact in any order.
+//! vectors are 12-bit integers. A vector therefore does not depend on how its window was assembled, and distances are
+//! exact in any order of the sums.
 //!
 //! Distances are divided by the variance of all windows, so they have the same scale for every exemplar. [`UNIT`] is
 //! half the distance of two unrelated windows.
@@ -36,7 +36,7 @@ pub const CHANNELS: usize = 4;
 /// Squared distance that equals the variance of all windows.
 pub const UNIT: i32 = SCALE * SCALE;
 
-/// An appearance vector, in units of 1 / 512 of the standard deviation of the windows.
+/// An appearance vector, in units of 1/512 of the standard deviation of the windows.
 pub type Feature = [i16; KEEP];
 /// A vector aligned to a cache line, so that a random read costs one access.
 #[repr(align(64))]
@@ -47,19 +47,19 @@ pub type Colour = [i16; CHANNELS];
 
 /// Standard deviation of windows in an appearance vector.
 const SCALE: i32 = 512;
-/// Largest number of 12 bits with a sign.
+/// Largest signed 12-bit integer.
 const TOP: f32 = 2047.0;
 /// Standard deviation of the Gaussian over a window, in samples.
 const SIGMA: f64 = 2.0;
 /// Maximum number of windows that the components are computed from.
 const SAMPLES: usize = 6000;
-/// Variance of windows, in squared colour steps. Up to this value an exemplar counts as uniform.
+/// Maximum variance of the windows of an exemplar that counts as uniform, in squared colour steps.
 const FLAT: f64 = 1e-3;
 /// Maximum number of values in a window: the components come from a square matrix of this side.
 const LONGEST: usize = 2048;
 /// Number of 16-bit values in a register.
 const LANES: usize = 16;
-/// Largest difference of two places that belong to the same patch of the exemplar: rounding moves them by half a
+/// Maximum difference of two places in the same patch of the exemplar, because rounding moves each by up to half a
 /// sample.
 const SAME: i32 = ONE * 3 / 4;
 /// Number of points in a task.
@@ -129,7 +129,8 @@ impl<const D: usize> Appearance<D> {
             features: Vec::new(),
             spacing: 0,
         };
-        // Learn the projection first: the vectors are computed by it, and the spacing from them.
+        // Learn the projection first, because the vectors are computed with it, and the spacing is computed from the
+        // vectors.
         this.projection = this.learn();
         monitor.check()?;
         this.features = this.describe_all(monitor);
@@ -250,7 +251,7 @@ impl<const D: usize> Appearance<D> {
         place
     }
 
-    /// Returns whether two places for one point belong to the same patch of the exemplar.
+    /// Returns whether two places for one point are in the same patch of the exemplar.
     #[inline(always)]
     pub fn same(&self, a: Place<D>, b: Place<D>) -> bool {
         (0..D).all(|axis| {
@@ -284,7 +285,7 @@ impl<const D: usize> Appearance<D> {
 
     /// Allocates memory for the values of one window.
     pub fn scratch(&self) -> Vec<i16> {
-        // Reserve room for a whole colour after the last one: `put` writes all four channels.
+        // `put` writes all four channels of a colour, so reserve memory for a whole colour at the last offset.
         vec![0; (self.offsets.len() * self.channels).next_multiple_of(LANES) + CHANNELS]
     }
 
@@ -373,7 +374,7 @@ impl<const D: usize> Appearance<D> {
         Centres { ranges }
     }
 
-    /// Returns the median distance from a window to the nearest one that does not overlap it much.
+    /// Returns the median distance from a window to the nearest window that overlaps it little.
     fn measure_spacing(&self, monitor: &Monitor) -> i32 {
         let centres = self.valid_centres();
         let count = (60_000_000 / self.grid.len())
@@ -429,8 +430,8 @@ impl<const D: usize> Appearance<D> {
 }
 
 /// Returns the squared distance of two appearance vectors.
-// Do not inline it: next to bounds checks the compiler unrolls it to scalar code; alone it becomes a few SIMD
-// instructions.
+// This function is not inlined. Next to bounds checks, the compiler would unroll it to scalar code. On its own, it
+// becomes a few SIMD instructions.
 #[inline(never)]
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;

@@ -100,7 +100,7 @@ wide_fn! {
             for (&w, &x) in row.iter().zip(window) {
                 sum += i32::from(w) * i32::from(x);
             }
-            // The product cannot overflow for a computed analysis; it wraps for other parts.
+            // The product cannot overflow if the analysis was computed here. With parts from elsewhere, it may wrap.
             let product = (i64::from(sum) - projection.bias[k]).wrapping_mul(projection.gain);
             let scaled = product.wrapping_add(1 << 31) >> 32;
             feature[k] = scaled.clamp(-2047, 2047) as i16;

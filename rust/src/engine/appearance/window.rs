@@ -3,7 +3,8 @@
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Maximum number of samples along an axis: places have 12 fractional bits of 32, and steps must fit too.
+/// Maximum number of samples along an axis. A place is a 32-bit number with 12 fractional bits, which must also be
+/// able to represent steps.
 const SIDE: usize = 1 << 18;
 
 /// Samples whose windows are inside an exemplar.

@@ -179,7 +179,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// Returns the cost of a place by the guide.
+    /// Returns the cost of a place according to the guide.
     #[inline(always)]
     fn obey(&self, origin: Place<D>, asked: &Asked<'_, D>) -> i64 {
         let Some(guide) = asked.guide else {
@@ -217,7 +217,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         difference as f64 / scale.max(0.05 * usual) + options.continuation * same as f64 / shell
     }
 
-    /// Returns how much of the patch the neighbouring cells show already.
+    /// Returns the fraction of the patch that neighbouring cells already show, summed over these cells.
     #[inline(always)]
     fn repeated(&self, origin: Place<D>, near: &[Place<D>], cell: usize) -> f64 {
         let reach = (cell as u32 * ONE as u32 / 2).max(ONE as u32);

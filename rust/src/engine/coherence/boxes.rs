@@ -13,7 +13,7 @@ const PAIRS: usize = FEW / 2;
 pub(super) type Block = [[i16; 2 * WIDTH]; PAIRS];
 /// The first [`FEW`] numbers of a vector, as pairs.
 pub(super) type Query = [[i16; 2]; PAIRS];
-/// A bit for each of eight distances that is at most a limit, and the eight distances.
+/// A bit for each of eight distances, set if the distance is at most a limit, and the eight distances.
 pub(super) type Found = (u32, [i32; WIDTH]);
 /// The minimum and the maximum of each of the first [`FEW`] numbers.
 pub(super) type Extent = [(i16, i16); FEW];

@@ -50,7 +50,7 @@ pub struct Options {
     pub passes: usize,
     /// Number of the first pass, if several calls share the work.
     pub first: u32,
-    /// If true, also compare each window with all windows of the exemplar. For small exemplars.
+    /// If true, also compare each window with all windows of the exemplar. This is slow for large exemplars.
     pub exhaustive: bool,
     /// Distance of the neighbours whose matches are tried, 1 or 2 points.
     pub reach: i32,
@@ -176,7 +176,7 @@ impl<const D: usize> Level<'_, D> {
         SLAB.max(8 * self.margin())
     }
 
-    /// Returns the cost of showing a sample at a point by the guide.
+    /// Returns the cost, according to the guide, of showing a sample at a point.
     #[inline(always)]
     fn asked(&self, point: usize, sample: usize) -> i64 {
         self.guide.as_ref().map_or(0, |g| g.cost(point, sample))

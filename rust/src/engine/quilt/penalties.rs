@@ -3,25 +3,25 @@
 use super::{CELL, Quilt, Window};
 use crate::kernels::patch_search::Match;
 
-/// Penalty of a patch that shows the same as all other patches, in units of the cost of a good match. Few places fit
+/// Penalty of a patch whose content all other patches show too, in units of the cost of a good match. Few places fit
 /// if elements are on a plain background. A larger penalty would then select patches that cut elements.
 const REPETITION: f64 = 10.0;
 /// Share of matches that count as good.
 const GOOD: f64 = 0.1;
-/// The same penalty on a lattice, in units of the cost of a typical match: all places are similar there, and must meet
-/// exactly.
+/// Repetition penalty on a lattice, in units of the cost of a typical match. There all places are similar, and patches
+/// must meet exactly.
 const ON_LATTICE: f64 = 2.5;
 /// Penalty of a patch that continues the patch of the exemplar next to it, in units of the cost of a typical match.
 const CONTINUATION: f64 = 2.0;
-/// Largest deviation of a patch from the lattice, in units of the lattice's shorter shift.
+/// Maximum deviation of a patch from the lattice, relative to the lattice's shorter shift.
 const IN_STEP: f64 = 0.15;
-/// Largest cost of the matches that agree with the lattice, as a factor of the best cost. If a lattice is irregular,
-/// the fit is more important.
+/// Maximum cost of the matches that agree with the lattice, relative to the best cost. If a lattice is irregular, the
+/// fit is more important than the lattice.
 const AS_WELL: f64 = 1.3;
-/// Largest share of the overlap where a patch may show the mirror image of the present content.
+/// Maximum fraction of the overlap where a patch may show the mirror image of the present content.
 const MIRRORED: f64 = 0.02;
-/// Distance in pixels within which two pixels count as the same place. It is a cell, because the axis of a mirror may
-/// be between two lines that are compared.
+/// Maximum distance in pixels between two pixels that count as the same place. It equals the side of a cell, because
+/// the axis of a mirror may be between two lines that are compared.
 const NEAR: f32 = 8.0;
 
 /// The penalties of a pool of matches, and the matches that are allowed.

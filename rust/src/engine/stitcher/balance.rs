@@ -64,7 +64,8 @@ impl Balance {
         next
     }
 
-    /// Returns the number of points that must change their class to give the shares of the exemplar.
+    /// Returns the number of points that must change their class, so that all classes have the same shares as in the
+    /// exemplar.
     pub(super) fn excess<const D: usize>(&self, source: &Source<D>) -> f64 {
         let wrong =
             |(&count, &share): (&i64, &f64)| (count as f64 - share * self.covered as f64).abs();

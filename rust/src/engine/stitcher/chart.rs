@@ -1,4 +1,4 @@
-//! A chart: the map of one patch from the output into the exemplar, up to the place of its centre.
+//! A chart: the map of one patch from the output into the exemplar, relative to its centre.
 
 use super::canvas::{Canvas, Window};
 use super::mesh::Mesh;
@@ -9,11 +9,11 @@ use crate::foundation::grid::Grid;
 const SHRINK: [f32; 4] = [1.0, 0.8, 0.65, 0.5];
 /// Maximum mean difference between the frame of the centre and the field in the inner part of a bent patch.
 const ADAPT: f32 = 0.7;
-/// Points of a bent patch that differ more from the field are left to other patches.
+/// Maximum difference between the frames of a bent patch and the field. Points above it are left to other patches.
 const TORN: f32 = 0.45;
 /// Divisor of the patch side at a pole of the field, where patches are rigid.
 const POLE: f32 = 1.75;
-/// Ratio of the boxes of a bent and a rigid patch.
+/// Ratio of the window sides of a bent patch and of a rigid patch.
 const BENT: f32 = 1.2;
 
 /// The map of a patch: exemplar coordinates of its points, relative to the coordinates of its centre.

@@ -24,16 +24,16 @@ use crate::{Error, Result};
 
 /// Minimum share of a box that one patch must fill. Other boxes are divided.
 const FILLED: f64 = 0.5;
-/// Maximum mean difference between a patch and the field. Boxes above it are divided along the axes along which the
-/// field changes, if more than half of a patch is shown along these axes. This gives a few slabs between folds instead
-/// of many cubes.
+/// Maximum mean difference between a patch and the field. A box with a larger difference is divided along the axes of
+/// the largest changes of the field. An axis along which the box shows half of a patch or less is not divided. The
+/// result is a few slabs between folds instead of many cubes.
 const STRAY: f32 = 0.2;
-/// Side of the patches that determine how many seams are covered again, as a share of the part. [`STEP`] is their
-/// distance as a share of that side.
+/// Side of the patches that determine how many seams are covered again, relative to the longest side of the part.
+/// [`STEP`] is the distance between these patches, relative to their side.
 const OF_PART: f32 = 0.8;
 const STEP: f32 = 0.6;
-/// Windows with more points are first cut between blocks of this side. Covered windows have more points with a choice
-/// than others, so the largest start with larger blocks than in [`LARGE`].
+/// Windows with more points are first cut between blocks of this side. In these windows more points have a choice than
+/// in others, so the largest windows start with larger blocks than in [`LARGE`].
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Minimum side of a box that is divided.
 const SMALL: usize = 12;

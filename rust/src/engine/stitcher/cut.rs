@@ -1,4 +1,5 @@
-//! The cut of one patch into the canvas. It assigns points to the patch so that the pairs that result cost least.
+//! The cut of one patch into the canvas. It assigns points to the patch so that the resulting pairs of neighbours have
+//! the lowest total cost.
 //!
 //! Kwatra et al. (SIGGRAPH 2003) compare the two images on both sides of a seam. This cut judges the pair that results:
 //! the kept point `p` next to the taken point `q`. It can thus distinguish a joint between two elements from the inside

@@ -21,10 +21,10 @@ const PROBES: usize = 4096;
 const BATCH: usize = 4;
 /// Number of the next centres that are examined for these patches.
 const AHEAD: usize = 256;
-/// Minimum side in output points, in two and three dimensions, of a patch that the field shrinks. Without it there
-/// would be one patch for every few points near a horizon.
+/// Minimum side in output points, in two and three dimensions, of a patch that the field shrinks. Without this
+/// minimum, there would be one patch for every few points near a horizon.
 const SEEN: [f32; 2] = [24.0, 12.0];
-/// Maximum side of a patch that was enlarged for [`SEEN`], as a share of the exemplar's shortest side.
+/// Maximum side of a patch that was enlarged to reach [`SEEN`], relative to the exemplar's shortest side.
 const LARGEST: f32 = 0.4;
 
 /// A patch that has been cut, but not applied yet.

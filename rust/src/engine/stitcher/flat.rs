@@ -14,7 +14,8 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Samples per line of the grid. A coordinate cannot hold the number of every sample.
+/// Number of samples in a line of the grid. Samples are arranged in lines because one coordinate has too few bits for
+/// their numbers.
 const LINE: usize = 1 << 14;
 /// Windows with more points are cut between blocks of this side, both to compare and to apply a patch.
 const JUDGED: (usize, usize) = (1 << 12, 4);
@@ -33,7 +34,7 @@ pub struct Pasting<'a> {
     pub seams: &'a [[f32; 2]],
     /// Points that a patch covers.
     pub mask: &'a [bool],
-    /// Points that must take it.
+    /// Points that must take the patch.
     pub core: &'a [bool],
 }
 

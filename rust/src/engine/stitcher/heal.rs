@@ -20,11 +20,11 @@ use crate::foundation::par;
 const LACK: f64 = 0.3;
 /// Number of rounds over all instances.
 const ROUNDS: usize = 2;
-/// Minimum share of its points that makes an instance complete.
+/// Minimum fraction of the points of an element that makes an instance complete.
 const WHOLE: f64 = 0.97;
-/// Minimum share of an instance that is completed.
+/// Minimum fraction of points for an attempt to complete an instance.
 const GROW: f64 = 0.35;
-/// Maximum share of an instance that is removed. Between both shares, both are tried.
+/// Fraction of points below which the removal of an instance is tried. From `GROW` to `DROP`, both are tried.
 const DROP: f64 = 0.7;
 /// Number of instances that are examined at the same time.
 const BATCH: usize = 4;
@@ -186,7 +186,7 @@ impl<const D: usize> Stitching<'_, D> {
         if share <= 0.0 || share >= WHOLE {
             return Ok(None);
         }
-        // A nearly complete instance may grow, a small one may be replaced by a neighbour.
+        // A nearly complete instance may be completed, and a small instance may be replaced by a neighbouring patch.
         let mut options = Vec::new();
         if share >= GROW {
             options.push((instance.key.0, true));

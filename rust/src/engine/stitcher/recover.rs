@@ -44,7 +44,8 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(())
     }
 
-    /// Returns the centres of the seams in the cells of a lattice with the highest costs, in descending order.
+    /// Returns the centres of the worst seams in descending order of their costs. Costs are summed over the cells of a
+    /// lattice.
     fn worst(&self, count: usize, patch: f32) -> Result<Vec<[i32; D]>> {
         let grid = &self.canvas.grid;
         let side = ((2.0 * HOLE * patch) as usize).max(2);

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 pub(super) const CHANNELS: usize = 4;
 /// A colour in units of the exemplar's mean standard deviation.
 pub(super) type Colour = [f32; CHANNELS];
-/// Maximum depth that is distinguished inside an element.
+/// Maximum depth inside an element. Larger depths are not distinguished.
 const DEEP: f32 = 7.0;
 
 /// Elements of an exemplar. Each array is empty or has one entry per sample.
@@ -22,7 +22,7 @@ pub struct Elements<'a> {
     pub depth: &'a [f32],
 }
 
-/// Costs of two neighbouring classes that are rarely adjacent in the exemplar.
+/// Costs of seams between classes that are rarely adjacent in the exemplar.
 #[derive(Debug, Clone, Copy)]
 pub struct Adjacency<'a> {
     /// Class of each sample. Empty if classes are not judged.
@@ -52,7 +52,7 @@ pub struct Source<const D: usize> {
     sizes: Vec<u32>,
     costs: Vec<f32>,
     classes: usize,
-    /// Share of the samples that are of each class.
+    /// Fraction of the samples that belong to each class.
     shares: Vec<f64>,
 }
 

@@ -17,7 +17,7 @@ pub struct Weights {
     pub joint: f32,
     /// Cost of a point outside all elements. Without it, elements become rarer, because cuts around them are shorter.
     pub presence: f32,
-    /// Cost of classes that are rarely adjacent.
+    /// Cost of neighbouring classes that are rarely adjacent in the exemplar.
     pub surprise: f32,
     /// Cost of the difference between a bent patch and the field.
     pub distortion: f32,

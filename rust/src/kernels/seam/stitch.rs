@@ -5,7 +5,7 @@
 //! image. In the overlap:
 //!
 //! 1. pixels of a core are tied to its image;
-//! 2. other pixels next to a pixel that only A covers are tied to A, then remaining pixels next to a pixel that only B
+//! 2. other pixels next to a pixel that only A covers are tied to A; of the rest, pixels next to a pixel that only B
 //!    covers are tied to B;
 //! 3. the remaining pixels minimise the sum of the costs of the cut edges ([`super::cost`]); among
 //!    equal sums, as few pixels as possible take B.

@@ -315,7 +315,7 @@ impl<const D: usize> Index<D> {
                 scores[lattice.position(block)] + self.repetition(lattice.centre(block, first))
             })
             .collect();
-        // Charge candidates that continue a neighbour exactly, also a few samples around.
+        // Charge candidates that continue a neighbour exactly, and candidates within a few samples of them.
         if self.charges.continuation > 0.0 {
             for centre in continued {
                 let at = std::array::from_fn(|a| (centre[a] >> lattice.level) + first[a]);
