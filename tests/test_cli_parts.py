@@ -37,7 +37,7 @@ def test_a_solid_into_zarr(files: Path, workers: int | None, capsys: pytest.Capt
     words += ["--origin", "-5,7,1", "--seed", "3", *(["--workers", str(workers)] if workers else [])]
     assert main(words) == 0
     said = capsys.readouterr().err
-    assert "each worker takes up to" in said
+    assert "each worker needs up to" in said
     assert "9 chunks, of which 0 were there" in said
     wanted = texrs.SolidTexture(STRIPES, seed=3)[1:25, 7:27, -5:25]
     assert np.array_equal(stores.open_store(files / "out.zarr").compute(), wanted)

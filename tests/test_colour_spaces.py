@@ -258,7 +258,7 @@ def test_colours_are_divided_by_alpha_on_the_way_out_of_exr(tmp_path: Path) -> N
         io.write(tmp_path / folder / "leaf_color.exr", np.dstack([colours, alpha]).astype(np.float32))
         with collect(show=lambda _: None) as notices:
             Material.read(tmp_path / folder).save(tmp_path / "out", suffix=".png", depth=8)
-        said = "leaf_color.exr: colours are divided by alpha, because EXR files have them multiplied by it"
+        said = "leaf_color.exr: colours are divided by alpha, because EXR files store them multiplied by alpha"
         assert (said in notices.assumed) is (folder == "multiplied")
         shown = io.read(next((tmp_path / "out").glob("*.png"))) / 255
         linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)[..., :3]

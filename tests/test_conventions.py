@@ -402,7 +402,7 @@ def test_four_channels_beside_their_colours_are_those_of_labpbr(tmp_path: Path) 
         "stone_n": Role.LABPBR_NORMAL,
     }
     assert (
-        "stone_n: read as labpbr-normal (its four channels do not store z, and stone is there)"
+        "stone_n: read as labpbr-normal (its four channels do not store z, and stone exists)"
         in material.notices.assumed
     )
     io.write(tmp_path / "stone_n.png", encode(draw_normals(down=True)))

@@ -170,7 +170,7 @@ def test_inks_become_srgb(tmp_path, kind):
         path.write_bytes(make.pillow(INKS, kind.split()[0], mode="CMYK", **options))
     back, notices = read_with_notices(path)
     assert back.shape == (24, 20, 3)
-    assert notices.assumed == [f"{path}: CMYK without a profile that can be used; converted to RGB by Pillow's formula"]
+    assert notices.assumed == [f"{path}: CMYK without a usable profile; converted to RGB by Pillow's formula"]
     expected = np.asarray(Image.frombytes("CMYK", (20, 24), INKS.tobytes()).convert("RGB"))
     assert_allclose(back.astype(int), expected, atol=8)
 
@@ -198,7 +198,7 @@ def test_a_damaged_profile_of_inks_is_not_used(tmp_path):
     path = tmp_path / "a.jpg"
     path.write_bytes(make.pillow(INKS, "JPEG", mode="CMYK", icc_profile=b"no profile" * 20))
     _, notices = read_with_notices(path)
-    assert "without a profile that can be used" in notices.assumed[0]
+    assert "without a usable profile" in notices.assumed[0]
 
 
 # --- TIFF ------------------------------------------------------------------------------------------------------------

@@ -301,7 +301,8 @@ def test_colours_are_multiplied_by_alpha_in_files(clear: bool, tmp_path: Path) -
     back = Material.read(tmp_path / "folder")
     np.testing.assert_allclose(back["albedo"].pixels, leaf, atol=1e-6)
     assert (
-        "albedo.exr: colours are divided by alpha, because EXR files have them multiplied by it" in back.notices.assumed
+        "albedo.exr: colours are divided by alpha, because EXR files store them multiplied by alpha"
+        in back.notices.assumed
     )
     # Read a file of another program, with and without clear pixels.
     other = {f"L.Color.{letter}": channels[f"albedo.{letter}"] for letter in "RGBA"}

@@ -54,7 +54,7 @@ def test_a_single_normal_map_is_one(here: Path, capsys: pytest.CaptureFixture[st
     """The result equals the source map's lookup of the normals as a map of a material."""
     assert main([verb, f"{name}.png", *VERBS[verb].split(), "-o", "out.png", "--source-map", "map.npz"]) == 0
     role = "normal-dx" if name.endswith("dx") else "normal"
-    assert f"{name}.png: read as {role}, because its name and its values say so" in capsys.readouterr().err
+    assert f"{name}.png: read as {role}, because its name and its values match this role" in capsys.readouterr().err
     truth = Material({"map": NORMALS[name]}, roles={"map": role}).apply(SourceMap.load("map.npz"))["map"].pixels
     made = io.read("out.png")
     assert (made == truth).all()

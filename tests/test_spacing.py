@@ -160,7 +160,7 @@ def test_constraints_lie_at_places_in_space(tmp_path: Path, capsys: pytest.Captu
     planes = ((np.arange(14) + 0.5) * 1.6 / 1.4).astype(int)
     inside = (planes >= 4) & (planes < 8)
     assert (made[inside][:, 6:12, 4:18] == 200).all()
-    assert "mask.nrrd: placed by its spacing" in capsys.readouterr().err
+    assert "mask.nrrd: resampled by its spacing" in capsys.readouterr().err
     io.write_volume(tmp_path / "mask.nrrd", near[:8], spacing=(1.4, 1.4, 1.4))
     assert main(["solid", source, "-o", out, *words, "--quality", "fast"]) == 2
     assert (

@@ -70,7 +70,7 @@ def divide(pixels: Array, name: str) -> Array:
     if clear.any() and (np.abs(colours[clear]) >= CLEAR).any(axis=-1).mean() > MOST:
         assume(f"{name}: colours are not divided by alpha, because clear pixels have colours")
         return pixels
-    assume(f"{name}: colours are divided by alpha, because EXR files have them multiplied by it")
+    assume(f"{name}: colours are divided by alpha, because EXR files store them multiplied by alpha")
     return undo(pixels)
 
 

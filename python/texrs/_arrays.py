@@ -306,7 +306,7 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     The mask can be an array of bool or integers (0 means False), a file, an image of PIL, or a `texrs.Mask`.
     """
     if isinstance(value, Mask) and value.feather:
-        raise InvalidInput(f"{name}: cannot have a feather; only a mask of a hole to fill can have one")
+        raise InvalidInput(f"{name}: cannot have a feather, which is only for masks of holes to fill")
     if isinstance(value, Mask | str | PathLike) or is_pillow(value):
         return mark(value, name, shape)
     given = as_ndarray(value, name, axes=len(shape))

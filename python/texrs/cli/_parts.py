@@ -113,7 +113,7 @@ class InParts(Verb):
             texture = kind(**{name: call[name] for name in TAKEN if name in call})
         sides = size or tuple(self.times * n for n in texture.exemplar.shape)
         memory = texture.estimate_memory(Grid.of(sides, asked.chunks, axes).chunks)
-        note(f"each worker takes up to {memory / 2**30:.1f} GiB", quiet=quiet)
+        note(f"each worker needs up to {memory / 2**30:.1f} GiB", quiet=quiet)
         first = given[next(o.name for o in options if o.argument)]
         spacing = call.get("spacing") or read_kept_spacing(first, str(paths["out"]), axes)
         write_part(texture, str(paths["out"]), sides, asked, spacing, count=count, quiet=quiet)

@@ -136,7 +136,7 @@ def read_points(path: str, about: About) -> list[list[float]]:
     if has_rows_first():
         return found
     if order is None:
-        assume(f"{path}: read as x,y: no first line names the columns, as x,y or row,column does")
+        assume(f"{path}: read as x,y, because the first line does not name the columns (x,y or row,column)")
     return found if order == [1, 0] else [values[::-1] for values in found]
 
 

@@ -128,7 +128,7 @@ def fit_volume(given: Array, path: str, about: About) -> Array:
             raise InvalidInput(f"{path}: must span {spans[1]} as the result does, got {spans[0]}")
         at = np.minimum(((np.arange(side) + 0.5) * mine / theirs).astype(np.intp), given.shape[axis] - 1)
         given = given.take(at, axis=axis)
-    assume(f"{path}: placed by its spacing, because its voxels are not those of the result")
+    assume(f"{path}: resampled by its spacing, because its voxels have another size than those of the result")
     return given
 
 

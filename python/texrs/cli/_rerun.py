@@ -225,10 +225,10 @@ def compare(recipe: Recipe, made: str) -> None:
         say(f"{recipe.path}: the same bytes, SHA-256 {now}")
         return
     if is_unchanged(made, recipe.text):
-        say(f"{recipe.path}: was changed since it was made; its inputs still make what it was, SHA-256 {now}")
+        say(f"{recipe.path}: was changed since it was made; its inputs still give the original file, SHA-256 {now}")
         return
     why = f"; it was made by texrs {recipe.version}, this is {__version__}" if recipe.version != __version__ else ""
-    raise InvalidInput(f"{recipe.path}: a new run gives a different file (SHA-256 {now} instead of {then}){why}")
+    raise InvalidInput(f"{recipe.path}: its inputs now give another file (SHA-256 {now}, this file has {then}){why}")
 
 
 # --- what a file holds -----------------------------------------------------------------------------------------------
@@ -258,12 +258,14 @@ def info_command(
         say(f"colours: {'sRGB' if notes.srgb else f'gamma {notes.gamma:g}'}")
     if notes.density is not None:
         down, across = (d * 0.0254 for d in notes.density)
-        say(f"density: {across:.4g} x {down:.4g} pixels an inch")
+        say(f"density: {across:.4g} x {down:.4g} pixels per inch")
     if recipe is None:
         return
     say(f"made by texrs {recipe.version}: {recipe.show()}")
     if recipe.rows_first and PLACED_FLAGS & recipe.options.keys():
-        say("its places are row,column, as they were before files stated the order; texrs rerun reads them so")
+        say(
+            "its places are row,column, because older files did not store the order; texrs rerun reads them in this order"
+        )
     for name, sha in recipe.inputs.items():
         say(f"from {name}, SHA-256 {sha}")
     if not is_unchanged(file, recipe.text):

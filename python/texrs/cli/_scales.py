@@ -63,8 +63,8 @@ def scale_map_command(
     origins = {"--mask": mask, "--auto": auto or None, "--slant": given["slant"], "--scale-map": scale_map}
     chosen = [option for option, value in origins.items() if value is not None]
     if len(chosen) != 1:
-        found = " and ".join(chosen) or "none of them"
-        raise InvalidInput(f"{', '.join(origins)}: exactly one must be given, got {found}")
+        found = " and ".join(chosen) or "none"
+        raise InvalidInput(f"{', '.join(origins)}: exactly one of these must be given, got {found}")
     check_needed(given, {"--slant": ANGLES, "--mask": MASKS, "--auto": (*MASKS, *FOUND)}, chosen[0])
     if hole is not None and chosen[0] not in ("--mask", "--auto"):
         raise InvalidInput(f"--hole: must be used with --mask or --auto, got {chosen[0]}")
@@ -121,7 +121,7 @@ def scale_map_command(
     extent, seconds = _outputs.show_sides(made.shape), time.monotonic() - start
     what = {None: "scales", "width": "widths", "area": "roots of areas"}[kind]
     if narrow:
-        note("without --fov sizes vary less than a camera shows them, by up to a factor of two", quiet=quiet)
+        note("without --fov, sizes vary less than in the photograph, by up to a factor of two", quiet=quiet)
     note(f"wrote {out}: {extent}, {what} {least:.3g} to {largest:.3g}, in {seconds:.1f} s", quiet=quiet)
 
 

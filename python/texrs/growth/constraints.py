@@ -79,7 +79,9 @@ class Constraints:
     def __post_init__(self) -> None:
         """Raise an error unless exactly one of values and coordinates is given."""
         if (self.values is None) == (self.coordinates is None):
-            raise InvalidInput("constraints: must have either values or coordinates of the points that mask marks")
+            raise InvalidInput(
+                "constraints: must have either values or coordinates, not both, for the points that mask marks"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

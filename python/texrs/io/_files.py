@@ -48,7 +48,7 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
         raise FileError(f"{path}: {what} failed ({describe_error(error)})") from error
     except Exception as error:
         raise FileError(
-            f"{path}: {what} failed; the file is corrupt, or of a kind that is not read ({describe_error(error)})"
+            f"{path}: {what} failed; the file is corrupt or of an unsupported kind ({describe_error(error)})"
         ) from error
 
 

@@ -285,7 +285,7 @@ def _read_header(path: Path, file: BinaryIO) -> Header:
     if dtype.hasobject:
         raise FileError(f"{path}: contains Python objects; reading them could run code, so only numbers are read")
     if dtype.kind not in "buif" or dtype.itemsize > 8:
-        raise FileError(f"{path}: must contain bool, integers or floats of at most 64 bits, got {dtype.str!r}")
+        raise FileError(f"{path}: must contain bool, integers or floats of up to 64 bits, got {dtype.str!r}")
     if len(shape) > 8 or not all(type(side) is int and 0 <= side < 2**48 for side in shape):
         raise FileError(f"{path}: must have a valid shape in its NumPy header, got {shape!r}")
     return Header(shape, dtype, fortran, file.tell() - start)

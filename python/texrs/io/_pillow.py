@@ -95,7 +95,7 @@ def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Se
                 image.seek(page)
                 pixels = _take_pixels(path, image)
             if pixels.shape[:2] != tuple(sides):
-                raise FileError(f"{path}: page {page + 1} has another size in Pillow than in tifffile")
+                raise FileError(f"{path}: page {page + 1} has a different size in Pillow than in tifffile")
             # Pillow has no signed modes and returns int16 as int32.
             if pixels.dtype.kind == dtype.kind == "i" and dtype.itemsize == 2:
                 pixels = pixels.astype(dtype)
@@ -371,7 +371,7 @@ def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
         ):
             raise FileError(f"{path}: is cut off; some of its pixels are missing")
         if getattr(image, "pixel_format", "").startswith("BC6H"):
-            assume(f"{path}: {image.pixel_format} holds floats; read as 8 bits, values above 1 as 1")
+            assume(f"{path}: {image.pixel_format} contains floats; read as 8 bits, values above 1 as 1")
     if kind == "psd" and any(number == 1057 and data[4:5] == b"\0" for number, _, data in image.resources):
         raise FileError(
             f"{path}: contains no flattened image; save it with 'maximize compatibility', or as TIFF or PNG"
@@ -412,5 +412,5 @@ def _convert_inks(path: Path, image: Any) -> Any:
             )
             assume(f"{path}: CMYK converted to sRGB by its profile")
             return converted
-    assume(f"{path}: CMYK without a profile that can be used; converted to RGB by Pillow's formula")
+    assume(f"{path}: CMYK without a usable profile; converted to RGB by Pillow's formula")
     return image.convert("RGB")

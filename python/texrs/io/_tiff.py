@@ -303,7 +303,7 @@ def _add_profile(tif: Any, profile: bytes) -> None:
     entries.sort(key=lambda entry: struct.unpack(layout.tagnoformat[0] + "H", entry[:2]))
     start = at + len(profile) + len(profile) % 2
     if start > 2 ** (8 * layout.offsetsize) - 2**17:
-        raise FileError("the ICC profile cannot be added, because the file is at the 4 GiB limit of classic TIFF")
+        raise FileError("the ICC profile does not fit, because a classic TIFF file cannot exceed 4 GiB")
     number = struct.pack(layout.tagnoformat, len(entries))
     file.write(b"".join([profile.ljust(start - at, b"\0"), number, *entries, following]))
     file.seek(layout.offsetsize)
@@ -453,7 +453,9 @@ def _part_alpha(path: Path, array: Array, page: Any, *, divided: bool = False) -
     """Return colours divided by an associated alpha, because texrs uses unassociated alpha everywhere."""
     if array.shape[-1] not in (2, 4) or tuple(page.extrasamples) != (_ASSOCIATED,) or array.dtype.kind not in "uf":
         return array
-    assume(f"{path.name}: colours are divided by alpha, because the file has them multiplied by it (associated alpha)")
+    assume(
+        f"{path.name}: colours are divided by alpha, because the file stores them multiplied by it (associated alpha)"
+    )
     if divided:
         return array
     most = np.iinfo(array.dtype).max if array.dtype.kind == "u" else 1

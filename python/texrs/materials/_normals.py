@@ -57,7 +57,7 @@ def settle_normals(maps: Mapping[str, Map], names: Collection[str], said: Collec
         elif not stored and not each.role.bare:
             each = replace(each, role=_find_bare(title, each, maps, said=name in said))
             if each.role is Role.LABPBR_NORMAL:
-                assume(f"{title}: read as labpbr-normal (its four channels do not store z, and {title[:-2]} is there)")
+                assume(f"{title}: read as labpbr-normal (its four channels do not store z, and {title[:-2]} exists)")
             elif each.channels > 2:
                 rest = "channel 3 stays as it is" if each.channels == 3 else "channels 3 and 4 stay as they are"
                 assume(f"{title}: read as normals without z (vectors with channel 3 do not have unit length); {rest}")

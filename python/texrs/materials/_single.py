@@ -45,7 +45,7 @@ def read_single(path: str) -> SingleMap | None:
         ignore(line)
     for line in notices.assumed:
         assume(line)
-    assume(f"{path}: read as {each.role.value}, because its name and its values say so")
+    assume(f"{path}: read as {each.role.value}, because its name and its values match this role")
     # Use the same name for all files, so that one file can be filled from another.
     return SingleMap({"map": each})
 

@@ -181,7 +181,7 @@ def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
     there = there & ~find_flat(np.where(there[..., np.newaxis, np.newaxis], slopes, 0.0))
     if not there.any():
         raise InvalidInput(
-            "coordinates: no pixel shows a surface, because all are NaN, without a neighbour, or equal to it"
+            "coordinates: no pixel shows a surface, because all are NaN or without a different neighbour"
         )
     if there.all():
         return slopes

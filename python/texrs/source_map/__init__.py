@@ -269,7 +269,7 @@ class SourceMap(Parted):
         several = [as_ndarray(e, "exemplars", axes=self.axes) for e in as_list(exemplars)]
         if len(several) != len(self.shapes):
             raise InvalidInput(
-                f"exemplars: must be {len(self.shapes)}, the number that the map was made from, got {len(several)}"
+                f"exemplars: must be {len(self.shapes)}, as many as the map was made from, got {len(several)}"
             )
         images = [as_image(e, "exemplars", axes=self.axes) for e in several]
         for i, (image, shape) in enumerate(zip(images, self.shapes, strict=True)):

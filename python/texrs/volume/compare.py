@@ -223,7 +223,7 @@ def compare(
             f"with {second.shape[-1]}"
         )
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
-        raise InvalidInput(f"source: must be the source map of the output, over {second.shape[:count]}")
+        raise InvalidInput(f"source: must be the source map of the output, of shape {second.shape[:count]}")
     # Classify both arrays, and choose the classes whose connected components are measured.
     if classes is None:
         labels = _as_labels(first, "exemplar"), _as_labels(second, "output")

@@ -66,7 +66,7 @@ def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Itera
     """
     x, rate = as_float(start, "start", -1, 1), as_float(growth_rate, "growth_rate", 0, 2)
     if abs(x) == 1:
-        raise InvalidInput(f"start: must be inside (-1, 1), got {start!r}")
+        raise InvalidInput(f"start: must be a number between -1 and 1, both excluded, got {start!r}")
     sizes = (abs(x) for x in walk(x, rate))
     first = list(islice(sizes, LOOKED_AT))
     if rate > PERIODIC and sum(a == b for a, b in pairwise(first)) >= STEADY:

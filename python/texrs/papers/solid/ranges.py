@@ -44,7 +44,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
                     f"got {_spell(part)}"
                 )
             if part.step is not None:
-                raise InvalidInput(f"texture: each range must be without a step, got {_spell(part)}")
+                raise InvalidInput(f"texture: must have ranges without a step, got {_spell(part)}")
             start, stop = _as_end(part.start), _as_end(part.stop)
         elif one:
             start = _as_end(part)

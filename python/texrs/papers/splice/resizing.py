@@ -73,7 +73,7 @@ def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
         raise InvalidInput(
-            f"size: must show at least {FEWEST} elements for the steps, got {len(entry.points)} at {size}"
+            f"size: must show at least {FEWEST} elements for the edit, got {len(entry.points)} at {size}"
         )
     return entry
 
