@@ -114,7 +114,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
     ("arguments", "message"),
     [
         ("", "--mask, --auto, --slant, --scale-map: exactly one of these must be given, got none"),
-        ("--auto --slant 3", "--scale-map: exactly one of these must be given, got --auto and --slant"),
+        ("--auto --slant 3", "--mask, --auto, --slant, --scale-map: exactly one of these must be given, got --auto and"),
         ("--auto --tilt 3", "--tilt: must be used with --slant, got --auto"),
         ("--slant 3 --hole hole.png", "--hole: must be used with --mask or --auto, got --slant"),
         ("--slant 89", "--slant: must be a number between 0 and 85.0, got 89.0"),

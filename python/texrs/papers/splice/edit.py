@@ -85,7 +85,7 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
         by_name = step["op"] in ("move", "remove", "points")
         at = STEPS[step["op"]][0](step, at, nameable if by_name and nameable is not None else originals, kept)
     if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
-        raise InvalidInput("edit: must not move elements to coordinates beyond 10^6 pixels")
+        raise InvalidInput("edit: must not move elements further than 10^6 pixels")
     return EditedLayout(at, kept, all(step["op"] in ("move", "points") for step in steps))
 
 
