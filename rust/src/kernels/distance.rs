@@ -31,8 +31,7 @@ const MOST: usize = 1 << 20;
 /// window contains only one side.
 ///
 /// # Errors
-/// The label image does not fit its shape, a window is empty or too large, or the monitor was
-/// cancelled.
+/// The size of the label image does not match its shape, a window is empty or too large, or the monitor was cancelled.
 pub fn outlines(
     labels: &[i32],
     shape: [usize; 2],

@@ -1,8 +1,8 @@
 //! Packing: the choice of disjoint sets with the largest total worth, among many sets that overlap.
 //!
 //! The problem is NP-hard. Sets are first chosen greedily in order of quality. Then a set replaces all chosen sets
-//! that it overlaps, if it is worth more than these together. Free sets are added. This is repeated until nothing
-//! changes.
+//! that it overlaps, if it is worth more than these together. Sets that overlap no chosen set are added. These
+//! exchanges are repeated until nothing changes or the number of rounds is reached.
 
 use crate::foundation::par::Monitor;
 use crate::kernels::hierarchy::Sets;

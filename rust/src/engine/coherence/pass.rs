@@ -20,8 +20,8 @@ pub struct Options {
     pub passes: usize,
     /// Number of components of the appearance vectors that are compared: [`FEW`] or all.
     pub numbers: usize,
-    /// If true, read the vectors of neighbours at the exact diagonal, x(q) + D - J q, instead of at the lattice point
-    /// near it.
+    /// If true, read the vectors of neighbours at the exact diagonal, x(q) + D - J q, instead of at the nearest
+    /// lattice point.
     pub compensated: bool,
 }
 

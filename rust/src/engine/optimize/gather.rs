@@ -43,7 +43,7 @@ impl Seen {
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// Returns the maximum distance between a point and another of its window, in row-major order.
+    /// Returns the maximum distance in memory, in points, between the centre of a window and a point of the window.
     pub(super) fn margin(&self) -> usize {
         let rows: usize = self.region.grid.strides().iter().sum();
         self.appearance.radius() * rows
@@ -66,12 +66,13 @@ pub(super) struct Eye<'a, const D: usize> {
     window: Vec<i16>,
     frame: Option<Frame<D>>,
     looks: Vec<Look<D>>,
-    /// Distance that the positions reach along each axis of the output; none if each position must be checked.
+    /// Maximum distance from the point to a position, along each axis of the output. `None` if each position must be
+    /// checked.
     reach: Option<[usize; D]>,
 }
 
 impl<'a, const D: usize> Eye<'a, D> {
-    /// Creates a reader; a constant frame is set here, once.
+    /// Creates a reader. If the frame is constant, its positions are computed here, once.
     pub(super) fn new(level: &'a Level<'a, D>, seen: &'a Seen) -> Self {
         let mut eye = Self {
             level,

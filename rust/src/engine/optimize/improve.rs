@@ -8,7 +8,8 @@ use crate::foundation::fixed::{ONE, Place, add, apply, nearest};
 use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
 
-/// Number of matches drawn around the best one: within the whole exemplar, then half of it, a quarter and so on.
+/// Number of random matches around the best match. The first is drawn from the whole exemplar, the next from half of
+/// it, then a quarter, and so on.
 const DRAWS: usize = 6;
 
 /// Values that are constant in a pass.

@@ -7,7 +7,7 @@
 //!
 //! 1. It gathers the window around the point, along the exemplar's axes, through the present coordinates.
 //! 2. It looks for a better match among the neighbours' matches (Barnes et al., *PatchMatch*, SIGGRAPH 2009) and a few
-//!    drawn around the best.
+//!    random matches around the best one.
 //! 3. It votes: it takes one of the coordinates that the windows around the point propose.
 //!
 //! There are three departures from the papers. A random match must be better by a multiple of the exemplar's own

@@ -1,18 +1,19 @@
-//! Recent changes, near which points are corrected again. Elsewhere a window is much the same as at the last
-//! correction, so another search would find the same match. A change next to a point often moves it, a distant change
-//! hardly ever.
+//! Recent changes, near which points are corrected again. Elsewhere a window is nearly the same as at the last
+//! correction, so another search would find the same match. A change next to a point often changes its match, but a
+//! distant change rarely does.
 
 use super::CHUNK;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 
-/// The points near a place that changed in one of the last two passes, one of each colour of the chessboard.
+/// Flags of the points near a change in one of the last two passes. The two passes correct the two colours of the
+/// chessboard.
 pub(super) struct Recent {
     radius: usize,
-    /// One bit for each of two passes; the lowest bit is the latest pass.
+    /// Changes of each point in the last two passes, as one bit for each pass. The lowest bit is the latest pass.
     changed: Vec<u8>,
-    /// Not zero near a change. Empty until two passes are complete.
+    /// Not zero at points near a change. Empty until two passes are complete.
     near: Vec<u8>,
 }
 

@@ -114,7 +114,7 @@ impl Quilt<'_> {
                 .collect()
         };
         let places: Vec<Vec<[usize; 3]>> = matches.iter().map(near).collect();
-        // Score each place once, although those of near matches overlap.
+        // Score each place once, although the neighbourhoods of close matches overlap.
         let mut every = places.concat();
         every.sort_unstable();
         every.dedup();

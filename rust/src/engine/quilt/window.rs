@@ -131,7 +131,7 @@ impl Window {
 }
 
 impl Around {
-    /// Returns the pixels of the bounds that the patch may cover, and those that it must cover.
+    /// Returns two masks of the bounds: the pixels that the patch may cover, and the pixels that it must cover.
     pub(super) fn masks(&self, window: &Window, shown: &[u32]) -> (Vec<bool>, Vec<bool>) {
         let ([rows, columns], width) = (window.shape(), self.bounds.shape()[1]);
         let (mut mask, mut core) = (vec![false; shown.len()], vec![false; shown.len()]);

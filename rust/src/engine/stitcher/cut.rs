@@ -1,9 +1,9 @@
 //! The cut of one patch into the canvas. It assigns points to the patch so that the resulting pairs of neighbours have
 //! the lowest total cost.
 //!
-//! Kwatra et al. (SIGGRAPH 2003) compare the two images on both sides of a seam. This cut judges the pair that results:
-//! the kept point `p` next to the taken point `q`. It can thus distinguish a joint between two elements from the inside
-//! of an element. The cost of an existing seam belongs to the state that keeps both points. The energy therefore
+//! Kwatra et al. (SIGGRAPH 2003) compare the two images on both sides of a seam. This cut judges the two points that
+//! become neighbours: the kept point `p` and the taken point `q`. It can thus distinguish a joint between two elements
+//! from the inside of an element. The cost of an existing seam is paid if both points are kept. The energy therefore
 //! stays submodular, and the cut is exact.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,8 +1,8 @@
 //! Healing: torn elements are completed, or replaced by their surroundings.
 //!
-//! An instance is the visible part of one element of the exemplar in one patch. It costs its missing points or its
-//! visible points, whichever are fewer. A complete element and an absent element cost nothing. Moves are cuts in small
-//! windows. A move is kept if the sum of the costs of seams and instances decreases.
+//! An instance is the visible part of one element of the exemplar in one patch. Its cost is proportional to the number
+//! of its missing points or of its visible points, whichever is smaller. A complete element and an absent element cost
+//! nothing. Moves are cuts in small windows. A move is kept if the sum of the costs of seams and instances decreases.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 

@@ -1,8 +1,8 @@
 //! The order of filling holes: from the rim inwards, so that patches from all sides meet in the
 //! middle.
 //!
-//! In scan order the last patches of a hole would have to fit pixels that may not change. From the
-//! rim inwards, patches meet other patches, and a cut may still remove parts of those.
+//! In scan order, the last patches of a hole would have to fit pixels that may not change. In the order from the rim
+//! inwards, patches meet other patches, and a cut may still replace parts of the earlier patches.
 
 use crate::foundation::grid::Grid;
 

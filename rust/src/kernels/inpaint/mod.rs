@@ -7,14 +7,14 @@
 //! 1. take the hole with the most known pixels around it, and the window over it whose known fraction is nearest to
 //!    0.6;
 //! 2. find good matches of the known pixels in the window, with the largest weights near the hole;
-//! 3. drop matches that would repeat or mirror their neighbourhood, and take the one of the others whose cut into the
-//!    known pixels is cheapest;
+//! 3. drop matches that would repeat or mirror their neighbourhood, and keep the remaining match with the cheapest cut
+//!    into the known pixels;
 //! 4. paste this match, and repeat until no hole is left.
 //!
-//! The literal method goes in scan order, centres the window and takes the best match at once. Its last rows must meet
-//! the far border of a hole without a choice, which tears large elements. From the rim inwards patches meet other
-//! patches, and a cut may run between them. Trying several windows and judging matches by their actual cuts leaves
-//! fewer visible seams.
+//! The literal method visits holes in scan order, centres the window on the hole and takes the best match at once. Its
+//! last patches must fit known pixels on several sides, which tears large elements. In the order from the rim inwards,
+//! patches meet other patches, and a cut may run between them. Trying several windows and judging matches by their
+//! actual cuts leaves fewer visible seams.
 
 mod choose;
 mod front;
@@ -50,8 +50,8 @@ const FLAT: f32 = 0.025;
 pub struct Options {
     /// Rows and columns of a patch.
     pub patch: [usize; 2],
-    /// Choice of the considered matches. The literal method cuts all of them, the default method
-    /// cuts the three most promising.
+    /// Choice of the matches that are considered. The literal method cuts in all of them, the default method the three
+    /// most promising.
     pub pick: Pick,
     /// Seed for the patches of windows without known pixels.
     pub seed: u64,

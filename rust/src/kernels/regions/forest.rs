@@ -19,7 +19,7 @@ const ASK: usize = 1024;
 #[derive(Clone, Copy)]
 struct Tree {
     area: u32,
-    /// Limit of the weights: only lighter edges join the region.
+    /// Limit of the weights: an edge joins the region only if its weight is below this limit.
     bears: f32,
 }
 
@@ -187,7 +187,7 @@ impl Forest {
         tree
     }
 
-    /// Whether an edge is too heavy for each of two trees.
+    /// Returns, for both trees, whether the weight of an edge reaches the limit of the tree.
     #[inline(always)]
     fn are_full(&self, roots: [u32; 2], weight: f32) -> [bool; 2] {
         roots.map(|root| weight >= self.trees[root as usize].bears)

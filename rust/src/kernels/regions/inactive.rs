@@ -5,14 +5,13 @@
 //! region does not change any more. Let u-v be the heaviest edge of a triangle u, v, y. There are
 //! two cases:
 //!
-//! - u-v would join two regions that are not full. Then u-y and y-v came before, and did not both
-//!   join their regions, because otherwise u and v would be in one region. So y is in a third
-//!   region, which was full when the first of the two edges came. It is early enough to consider
-//!   u-v at that time: when an edge separates a full region from one that is not full. Either of
-//!   u-y and y-v is enough to detect this.
-//! - u-v would join the small region of v to that of u. Then y-v, which came before, has joined v
-//!   and y, so both have the area of their union. The lighter edge u-y has joined u and y, or has
-//!   separated two regions that are large enough. So u-v never does this.
+//! - u-v would join two regions that are not full. Then u-y and y-v came before, and did not both join their regions,
+//!   because otherwise u and v would be in one region. So y is in a third region, which was full when the first of the
+//!   two edges came. It is therefore enough to consider u-v from the time when an edge separates a full region from a
+//!   region that is not full. This is detected at u-y or at y-v.
+//! - u-v would join the small region of v to the region of u. Then y-v, which came before, has joined v and y, so both
+//!   have the area of their union. The lighter edge u-y has joined u and y, or has separated two regions that are
+//!   large enough. So u-v is never the edge that joins a small region.
 //!
 //! The heaviest edges of triangles are therefore left out of the list of edges. An edge stays in
 //! the list if in all its triangles both other edges are such edges themselves, because these might

@@ -44,7 +44,7 @@ pub struct Labels {
 /// and at most 2^26 such steps.
 ///
 /// # Errors
-/// Arrays do not fit, a pairwise cost is negative or not finite, or a unary cost is NaN or minus
+/// The sizes of the arrays do not match, or a pairwise cost is negative or not finite. A unary cost is NaN or minus
 /// infinity, or forbids both labels.
 pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -> Result<Labels> {
     let n = energy.grid.len();

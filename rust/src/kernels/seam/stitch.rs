@@ -96,7 +96,7 @@ impl<const D: usize> Stitcher<D> {
     /// Returns the least visible seam of an overlap.
     ///
     /// # Errors
-    /// Arrays do not fit the grid, or values in the overlap are not finite. A penalty or a cost of
+    /// The sizes of the arrays do not match the grid, or values in the overlap are not finite. A penalty or a cost of
     /// old seams is negative or not finite. A core is outside its image or overlaps the other core.
     pub fn cut(&mut self, overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
         let cut = self.cut_within(overlap, f64::INFINITY, monitor)?;

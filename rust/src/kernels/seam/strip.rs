@@ -44,7 +44,7 @@ pub struct Pasted<'a> {
 /// Costs are rounded to multiples of 2^-16, or coarser if a straight seam costs more than 2^13.
 ///
 /// # Errors
-/// Arrays do not fit, there are fewer than two pixels along `axis`, or values or penalties are not
+/// The sizes of the arrays do not match, or there are fewer than two pixels along `axis`. Values or penalties are not
 /// finite, or a penalty is negative.
 pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     let pixels = pasted.shape[0].saturating_mul(pasted.shape[1]);

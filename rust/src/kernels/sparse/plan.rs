@@ -1,8 +1,8 @@
 //! The pattern of a factor: the rows of each block, and the positions of its numbers.
 //!
-//! The terms are those of the multifrontal method of Duff and Reid (1983). The front of a block
-//! contains the columns of its own unknowns, and the rest: their contribution to later blocks. The
-//! rest is added to the parent, whose rows include all rows of the rest.
+//! The terms are from the multifrontal method of Duff and Reid (1983). The front of a block contains the columns of
+//! its own unknowns. The rest is the contribution of the block to later blocks. It is added to the parent, whose rows
+//! include all rows of the rest.
 
 use std::ops::Range;
 

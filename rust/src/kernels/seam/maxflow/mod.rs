@@ -161,7 +161,7 @@ impl<const D: usize> Solver<D> {
     /// Returns the minimum cut of a graph.
     ///
     /// # Errors
-    /// Arrays do not fit the grid, there are more than 2^31 nodes, or the monitor was cancelled. A
+    /// The sizes of the arrays do not match the grid, there are more than 2^31 nodes, or the monitor was cancelled. A
     /// capacity is negative, or the two capacities of a pair sum to more than `i32::MAX`.
     pub fn min_cut(&mut self, graph: &Graph<'_, D>, monitor: &Monitor) -> Result<Cut> {
         let cut = self.min_cut_within(graph, i64::MAX, monitor)?;

@@ -84,7 +84,7 @@ const fn eighths(direction: usize) -> usize {
 /// Returns the cheapest seam of a strip.
 ///
 /// # Errors
-/// There are fewer than two columns, arrays do not fit, or costs along a straight row or column sum
+/// There are fewer than two columns, or the sizes of the arrays do not match. Costs along a straight row or column sum
 /// to 2^30 or more.
 pub fn least_seam(strip: &Strip<'_>, monitor: &Monitor) -> Result<Seam> {
     check(strip)?;
