@@ -53,8 +53,8 @@ def extend(
     image : (H, W) or (H, W, C) array
         The photograph, of any real dtype, at least 64 pixels a side.
     top : int
-        Pixels to add at the top, 0 to 8192. One side or more must be above 0. Nothing is added beyond the horizon.
-        Default: 0.
+        Pixels to add at the top, 0 to 8192. Unless ``size`` is given, at least one side must be above 0. Nothing is
+        added beyond the horizon. Default: 0.
     bottom : int
         Pixels to add at the bottom, 0 to 8192. Default: 0.
     left : int
@@ -62,8 +62,8 @@ def extend(
     right : int
         Pixels to add on the right, 0 to 8192. Default: 0.
     size : int or (rows, columns), optional
-        Size of the larger image, in pixels. Pixels that the four sides do not add are distributed evenly over opposite
-        sides. If one side would pass the horizon, the other side takes the rest.
+        Size of the larger image, in pixels. Pixels beyond those requested for single sides are distributed evenly over
+        opposite sides. If one side would pass the horizon, the other side takes the rest.
     view : PlaneView or Plane, or a sequence of them, optional
         Position of the plane in the photograph, as far as it is known. The rest is found. If the result is uncertain,
         or the plane is seen from the front, elements have the size that they have anywhere in the image. Background
@@ -79,7 +79,7 @@ def extend(
         If True, the added pixels follow gradual changes of light, such as towards a window. Beyond the photograph the
         light stays as at the border. Default: True.
     seed : int
-        Seed that chooses among the possible results. Default: 0.
+        Seed of the random choices. Default: 0.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
         the work. True shows a bar.

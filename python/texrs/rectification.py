@@ -70,8 +70,8 @@ def rectify(
         Pixels of the texture for one pixel in the middle of the photograph, 0.05 to 8. Default: the median scale of
         the visible plane, or less if the flattened plane would be too large.
     size : int or (rows, columns), optional
-        Size of the texture, in pixels. A size above that of the largest sharp rectangle is synthesised from it. A
-        smaller size is the middle of the rectangle. Default: the size of the rectangle.
+        Size of the texture, in pixels. A texture that is larger than the largest sharp rectangle is synthesised from
+        the rectangle. A smaller size is the middle of the rectangle. Default: the size of the rectangle.
     wrap : bool or (rows, columns), optional
         Axes along which the texture will be tileable (`texrs.tile`). Default: none.
     seed : int

@@ -65,7 +65,7 @@ def remove(
         result is uncertain, or the plane is seen from the front, the filling has the size of elements anywhere in the
         image. Several planes, such as a floor and a wall, are filled separately. Only one of them may lack a ground.
     margin : int, optional
-        Growth of the mask in pixels, 0 to 64. Default: 1/150 of the shorter side.
+        Growth of the mask on all sides in pixels, 0 to 64. Default: 1/150 of the shorter side.
     boundary_width : int, optional
         Width in pixels of the band around the mask that may also change, 0 to 64, so that seams are least visible.
         Only pixels that a seam encloses change. Default: 1/40 of the shorter side, or 1/12 for planes with separate
@@ -80,7 +80,7 @@ def remove(
         If True, the filled pixels follow gradual changes of light, such as towards a window. The light of the source
         is divided out, and the light of the target is multiplied in. Default: True.
     seed : int
-        Seed that chooses among the possible results. Default: 0.
+        Seed of the random choices. Default: 0.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the completed share of the stage. An exception that it raises stops
         the work. True shows a bar. Default: no reports.

@@ -95,7 +95,7 @@ def batch_command(
             "--out",
             "-o",
             metavar="DIR",
-            help="Folder for the results, or a name such as 'made/{folder}/{name}-{seed}.png'.",
+            help="Folder for the results, or a pattern of their paths, such as 'made/{folder}/{name}-{seed}.png'.",
         ),
     ] = None,
     seeds: Annotated[

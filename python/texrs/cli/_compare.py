@@ -30,7 +30,8 @@ def compare_command(
     ] = None,
     crop: Annotated[int, typer.Option(help="Side in pixels of the crop from the middle of each image.")] = 128,
     larger: Annotated[
-        int | None, make_option(None, "Side of the larger textures in pixels. Default: 1.5 times the example.")
+        int | None,
+        make_option(None, "Side of the larger textures in pixels. Default: 1.5 times the side of the example."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all methods that use random numbers.")] = 0,
     program: Annotated[
@@ -41,7 +42,7 @@ def compare_command(
         bool,
         typer.Option(
             "--seconds/--no-seconds",
-            help="If --seconds, the page contains the time of each method. Otherwise its bytes are the same each time.",
+            help="If --seconds, the page contains the time of each method. If --no-seconds, each run writes the same bytes.",
         ),
     ] = True,
     count: Threads = None,

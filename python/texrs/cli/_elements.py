@@ -56,7 +56,7 @@ ACTIONS: dict[str, tuple[Option, ...]] = {
 def analyse_command(
     out: Annotated[str, to_write("out", "ENTRY.npz", "File of the elements to write.")],
     given: dict[str, Any],
-    more: Annotated[list[str] | None, make_argument("X,Y", "More places for --background.")] = None,
+    more: Annotated[list[str] | None, make_argument("X,Y", "More points for --background.")] = None,
     stages: Annotated[str | None, to_write("stages", text="Folder for images of the points and the mask.")] = None,
     page: Annotated[str | None, to_write("page")] = None,
     role: Roles = None,
@@ -106,7 +106,10 @@ def database_command(
     folder: Annotated[str, make_argument("DIR", "Folder of the database, created if needed.")],
     action: Annotated[
         str,
-        make_argument("|".join(ACTIONS), "Add images, list or remove textures, splice two, or splice all pairs."),
+        make_argument(
+            "|".join(ACTIONS),
+            "Action: add images, list textures, remove textures, splice two, or splice all pairs (matrix).",
+        ),
     ],
     given: dict[str, Any],
     items: Annotated[
@@ -114,7 +117,7 @@ def database_command(
     ] = None,
     out: Annotated[str | None, to_write("out", text="Image file for splice and matrix.")] = None,
     each: Annotated[
-        str | None, make_option("DIR", "Folder for all results of matrix at full size: A-on-B.png.")
+        str | None, make_option("DIR", "Folder for all results of matrix at full size, named A-on-B.png.")
     ] = None,
     count: Threads = None,
     quiet: Quiet = False,

@@ -45,7 +45,10 @@ def demo_command(
 
 def samples_command(
     names: Annotated[list[str] | None, make_argument("NAME", "Names of samples. Default: all.")] = None,
-    out: Annotated[str | None, to_write("out", "DIR", "Folder for the samples, as .png and .tif.")] = None,
+    out: Annotated[
+        str | None,
+        to_write("out", "DIR", "Folder for the samples (.png or .tif). Default: their names are only listed."),
+    ] = None,
     size: Annotated[
         str | None,
         make_option("SIZE", "Size of generated samples in pixels or voxels, such as 256, 256x192 or 64x64x64."),

@@ -109,7 +109,9 @@ ENTRIES = replace(
     many=True,
 )
 WHITE = "White pixels are marked. In an image with transparency, opaque pixels are marked."
-WORDS = f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 sets --threshold and --grow of texrs remove."
+WORDS = (
+    f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 acts like these options of texrs remove."
+)
 """Description of masks in the help."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
 GROUNDS = replace(
@@ -117,20 +119,20 @@ GROUNDS = replace(
     metavar=f"FILE|{FOUND}",
     words=(FOUND,),
     read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
-    note=f"{WORDS} Repeat the option for several planes. The word {FOUND} lets texrs find the pixels of one.",
+    note=f"{WORDS} Repeat the option for several planes, with {FOUND} where texrs must find the pixels.",
     many=True,
 )
 QUOTED = "Four points in quotes, such as '20,20 104,24 110,100 14,112'."
 CORNERS = Kind(
     "X,Y ...",
     lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
-    f"{QUOTED} For several planes, repeat the option in the order of --ground. The word {FOUND} lets texrs find the plane.",
+    f"{QUOTED} For several planes, repeat the option in the order of --ground, with {FOUND} where texrs must find the plane.",
     many=True,
 )
 EACH = Kind(
     "NUMBER",
     parse_each,
-    f"For several planes, repeat the option in the order of --ground. The word {FOUND} lets texrs find the value.",
+    f"For several planes, repeat the option in the order of --ground, with {FOUND} where texrs must find the value.",
     many=True,
 )
 """Kind of a parameter with one value for each plane of a photograph."""
@@ -139,7 +141,8 @@ OBJECT = Kind("FILE", lambda path, about: name_file(path), WHITE, file=True)
 FILLED = Kind(
     "FILE|alpha|nan|nodata|VALUE",
     read_hole,
-    f"{WHITE} nan: NaN or infinite pixels. nodata: pixels of the value that the file states. VALUE: pixels of this value.",
+    f"{WHITE} alpha: pixels that are not fully opaque. nan: NaN or infinite pixels. "
+    "nodata: pixels of the value that the file states. VALUE: pixels of this value.",
     file=True,
     words=("alpha", "nan", "nodata"),
 )
@@ -184,7 +187,7 @@ SIZE = Kind(
 )
 SHARES = Kind("A:B:...", lambda text, about: parse_numbers(text, about.option, "numbers such as 2:1:1"))
 
-STEPS = "Names of steps, JSON, or a JSON file. The report of an earlier run repeats its steps."
+STEPS = "Give names of steps, JSON, or a JSON file. The report.json of an earlier run applies its steps again."
 
 KINDS = {
     "size": SIZE,
@@ -225,8 +228,10 @@ KINDS = {
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
     "background": Kind("X,Y", parse_places, "The option may be repeated.", many=True),
     "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X,Y is the centre of the box."),
-    "points": Kind("POINTS.csv", read_points, "Each line is x,y. A header line may be x,y or row,column.", file=True),
-    "corrections": Kind("JSON|FILE.json", read_corrections, "The page that texrs analyse --page writes lists them."),
+    "points": Kind(
+        "POINTS.csv", read_points, "Each line is x,y. A first line row,column states the other order.", file=True
+    ),
+    "corrections": Kind("JSON|FILE.json", read_corrections, "They are on the page that texrs analyse --page writes."),
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
 }

@@ -50,8 +50,8 @@ MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", 
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write. Its suffix selects the format."),
-    "source_map": (("--source-map",), "OUT.npz", "File for the source map, for texrs apply."),
-    "stages": (("--stages",), "DIR", "Folder for images of the stages and report.json."),
+    "source_map": (("--source-map",), "OUT.npz", "File for the source map, which texrs apply reads."),
+    "stages": (("--stages",), "DIR", "Folder for images of the intermediate stages, and for report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
     "preview": (("--preview",), "OUT.png", "Image of the lit material: 2 x 2 copies."),
     "mipmaps": (("--mipmaps",), "DIR", "Folder for the mipmaps of a material."),

@@ -34,7 +34,7 @@ from texrs.materials._single import SingleMap
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
-    help="Number of variants. They are written as OUT-SEED, and OUT becomes their contact sheet.",
+    help="Number of variants. Each is written to OUT-SEED, and a contact sheet of all to OUT.",
     show_default="1, written to OUT",
     metavar="N",
 )
@@ -42,7 +42,7 @@ PALETTE = Annotated[
     bool | None,
     typer.Option(
         "--palette/--no-palette",
-        help="If --palette, only colours of the input are used: nearest pixels without seam correction.",
+        help="If --palette, only colours of the input are used: pixels are neither interpolated nor corrected at seams.",
         show_default="if the input is indexed or has few colours",
     ),
 ]

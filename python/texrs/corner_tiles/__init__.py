@@ -70,7 +70,7 @@ class CornerTiles(InParts):
         Example, as for `texrs.design`.
     tile_size : int, optional
         Side of a tile in pixels, 32 to 1024 and a multiple of 4. Default: the exemplar's shorter side, limited to 64
-        to 256, or less to contain whole periods of a repeating exemplar.
+        to 256, or reduced so that a tile contains whole periods of a repeating exemplar.
     seed : int
         Seed of the tiles and of their arrangement, 0 to 2^64 - 1.
     variants : int

@@ -167,9 +167,9 @@ class TextureDatabase:
         image : path_like or (H, W[, C]) array
             Image: a path, whose file stays where it is, or pixels, which are copied to the folder.
         name : str, optional
-            Name of up to 100 letters, digits, ``.``, ``_`` and ``-``. Default: the name of the file.
+            Name of the texture: up to 100 letters, digits, ``.``, ``_`` and ``-``. Default: the name of the file.
         replace : bool
-            If True, replace a texture of this name with another image. Default: False.
+            If True, an existing texture of this name is replaced. Default: False.
         similarity : bool
             If True, also compute and store the similarity sets, which save time in later refinements. Default: False.
         progress : callable or True, optional

@@ -69,14 +69,14 @@ def analyse(
         result is uncertain, all maps are analysed as well, and the more certain result is used. The result contains
         the colours.
     box : (row, column, height, width), optional
-        Centre and size of the box around one element, in pixels. For a connected foreground, a box around one mesh or
+        Centre and size of the box around one element, in pixels. The element of a connected foreground is one mesh or
         one knot.
     mask : (H, W) array of bool, path or Mask, optional
         Mask of the foreground. If it is within the box, it is the foreground of the chosen element. Otherwise it is
         the foreground of the whole image, and no graph cut is made.
     background : (n, 2) points or (H, W) array of bool, optional
-        Points (row, column) between the elements, where each marks a radius of 4 pixels; or a mask of all known
-        background.
+        Points (row, column) between the elements, where each marks a radius of 4 pixels. Python also accepts a mask of
+        all known background.
     layout : Layout or str, optional
         Layout of the elements: separate ("disjoint"), a connected foreground ("connected"), or separated by joints
         ("jointed"). The paper's "F=d", "F=c" and "B=c" are accepted. Default: the layout that is found.

@@ -22,13 +22,14 @@ class ElementSearch:
     Parameters
     ----------
     rotations : int
-        Number of search directions, 1 to 72, evenly spread over the circle. 1 searches only for upright elements.
+        Number of orientations to search for, 1 to 72, evenly spread over 360 degrees. 1 finds only upright elements.
     scales : sequence of float
         Sizes to search for, relative to the box: 1 to 16 numbers from 0.25 to 4.
     threshold : float, optional
-        Minimum similarity, -1 to 1. Default: the value that best separates two classes of candidates (Otsu).
+        Minimum similarity to the chosen element, -1 to 1. Default: the value that best separates two classes of
+        candidates (Otsu).
     channel : {"weighted", "min-entropy"}, optional
-        Channels of the appearance vectors for the similarity. "weighted" uses all, weighted by their variance.
+        Channels of the appearance vectors that are compared. "weighted" uses all, weighted by their variance, and
         "min-entropy" uses the channel whose map has the lowest entropy. Default: "weighted", or "min-entropy" with
         ``method="paper"``.
     model : {"mixture", "nearest"}, optional

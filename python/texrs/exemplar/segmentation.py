@@ -44,9 +44,9 @@ class ElementOptions:
     Attributes
     ----------
     layers : int, optional
-        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. Default: two, or three or
-        four if these find clearly more separate elements of the same size. If the background has fine grain, smooth
-        areas belong to the layer above it.
+        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. If the background has fine
+        grain, smooth areas belong to the layer above it. Default: two, unless three or four find clearly more separate
+        elements of the same size.
     segmentation : {"auto", "components", "grid", "none"}
         Method for finding elements. "components": connected areas of the layers above the background. "grid": jittered
         cells of 1/6 of the side, for images without separate elements. "none": whole layers. "auto": components, or
@@ -54,7 +54,7 @@ class ElementOptions:
         image, or one covers more than 25 %. The same holds if they are ragged or of very different sizes. They are
         also not convincing if their outlines have no more contrast than their inside or their surroundings.
     labels : (H, W) array of int, or a list of one per exemplar, optional
-        Elements marked by hand, where 0 is the background. Replaces the whole segmentation.
+        Elements marked by hand: one number per element, where 0 is the background. They replace the segmentation.
 
     Raises
     ------

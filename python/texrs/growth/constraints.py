@@ -41,7 +41,7 @@ class Constraints:
     Attributes
     ----------
     mask : (rows, columns) or (planes, rows, columns) bool or int array
-        Mask of the given points. Python marks points by values other than 0.
+        Mask of the points of the output that are given. Python marks points by values other than 0.
     values : (size[, C]) array, optional
         Values of the given points, in the exemplar's dtype and channels. The output shows them exactly. Values of
         other points are ignored.
@@ -91,14 +91,14 @@ class Guide:
     Attributes
     ----------
     exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
-        Quantity at each sample of the exemplar, such as its depth. Python accepts finite numbers that broadcast to the
-        exemplar's axes.
+        Quantity that guides the synthesis, at each sample of the exemplar, such as its depth. Python accepts finite
+        numbers that broadcast to the exemplar's axes.
     output : (rows, columns[, C]) or (planes, rows, columns[, C]) array_like
         Requested quantity at each point of the output, in the same unit. Python accepts finite numbers that broadcast
         to the size of the output.
     weight : float
         Weight of the guide compared with similarity to the exemplar, 0 to 100. If it is 1, a difference of a third of
-        the range of the exemplar's map costs as much as two unrelated windows.
+        the quantity's range in the exemplar costs as much as two unrelated windows.
 
     Raises
     ------

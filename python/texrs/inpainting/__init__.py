@@ -74,10 +74,10 @@ def inpaint(
         and may be NaN. For a volume, only ``patch_size``, ``boundary_width``, ``screening`` and ``seed`` are allowed;
         the other options are for images.
     mask : (H, W) array, Mask, path, number, "alpha", "nan" or "nodata", optional
-        Mask of the pixels to fill. "alpha": all pixels that are not fully opaque. "nan": all pixels that are NaN or
-        infinite. "nodata": all pixels of the value that the file of the image states for missing data. A number: all
-        pixels of this value. See `texrs.Mask` for how a mask is read, inverted, grown and feathered. A mask of three
-        axes means a volume. Default: all pixels that are masked, NaN or infinite.
+        Mask of the pixels to fill. A mask of three axes means a volume. "alpha": all pixels that are not fully opaque.
+        "nan": all pixels that are NaN or infinite. "nodata": all pixels of the value that the file of the image states
+        for missing data. A number: all pixels of this value. See `texrs.Mask` for how a mask is read, inverted, grown
+        and feathered. Default: all pixels that are masked, NaN or infinite.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another image to copy from, of the same dtype and channels. Default: the known pixels of ``image``.
     allowed : (H, W) array, path or Mask, optional
@@ -91,8 +91,8 @@ def inpaint(
         Size of the elements in ``exemplar``, in the units of ``scale_map``. Measured maps have a geometric mean of 1.
         Default: 1 everywhere, as in an image taken from the front.
     scale_kind : {"width", "area"}, optional
-        Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width", widths across the slope, or
-        "area", square roots of areas. Default: the quantity that fits each map best as a map of a plane.
+        Quantity in maps that do not state it (`texrs.scale_maps.ScaleMap`): "width" (widths across the slope) or
+        "area" (square roots of areas). Default: the quantity that fits each map best as a map of a plane.
     method : {"patch", "optimise"}
         Method of filling. "patch": patches that match the surroundings are joined along cuts [1]_. If the scale map is
         that of a plane, patches of the plane are projected into the hole, except with an ``exemplar``. "optimise":
@@ -102,8 +102,8 @@ def inpaint(
         Side of a patch in pixels, at least 4. It should be about the size of the elements. Large holes are tried in a
         small copy. With a scale map, the side is 1/6 of the shorter side, and up to 1/4 for a plane. "optimise" has no
         patches, and does not accept a side. Volumes: at least 6, and 12 to 32 by default, depending on the hole.
-        Smaller sides are tried if the border of the hole is visible. Default: the side with the least visible seams
-        among 0.75 to 4 times 1/6 of the shorter side (12 to 32).
+        Smaller sides are tried if the border of the hole is visible. Default: the side with the least visible seams,
+        0.75 to 4 times 1/6 of the shorter side (limited to 12 to 32).
     boundary_width : int
         Width in pixels of a band around the hole that may also be replaced, 0 to 1024. The seam can then follow the
         least visible path. If 0, known pixels do not change. Default: 0.

@@ -167,15 +167,15 @@ def texture_mesh(
         the slope of its relief along columns and rows: (0, 0, 1) is flat. The surface gets this slope wherever it cuts
         the texture.
     scale : float, optional
-        Number of voxels per unit of the mesh, or of units of the spacing if the texture has one. Default: the longest
-        side shows the exemplar four times, or fewer times if a voxel would be smaller than a texel of the atlas.
+        Number of voxels per unit of the mesh. If the texture has a spacing, its units are counted instead. Default:
+        the mesh's longest side shows the exemplar four times, or fewer times if a voxel would be smaller than a texel.
     atlas : int, optional
         Side of the atlas in texels, 16 to 16384. Without an atlas, vertices get colours instead. Default: 1024.
     padding : int
         Width of the border that is painted around each chart of the atlas, in texels, 0 to 64. It shows the texture
         in the plane of the nearest triangle, so that seams between charts are not visible. Default: 4.
     unwrap : bool
-        If True, xatlas lays out the whole mesh again, and existing UVs are not used. Default: False.
+        If True, xatlas computes new UVs for the whole mesh, and existing UVs are not used. Default: False.
     progress : callable or True, optional
         Function that is called as ``progress(stage, share)``. If it raises, the work stops. True shows a bar.
 

@@ -60,8 +60,8 @@ def field_on_surface(
     scale : float
         Number of voxels in a unit of the mesh, as for `texture_mesh`.
     along : {"x", "y", "z"}
-        Axis of the exemplar that follows the directions. Its axis of planes points out of the surface, or its axis of
-        rows if planes follow the directions.
+        Axis of the exemplar that follows the directions: x, y or z. The z axis points out of the surface, or the y
+        axis if ``along`` is "z".
     resolution : int
         Number of cells of the field along the longest side of the mesh, 8 to 200. Default: 48.
 

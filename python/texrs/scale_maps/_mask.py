@@ -67,9 +67,9 @@ def from_mask(
         linearly in the image. ``"linear"``: log S varies linearly. ``"quadratic"``: log S varies quadratically.
         Default: "none".
     foreshortened : bool
-        If True, the image shows an oblique plane, and the map contains widths across the slope (see `from_angles`). If
-        False, it contains the square roots of areas, which are the power 3/2 of the widths on such a plane. Default:
-        False.
+        If True, the image must show an oblique plane, and the map contains widths across the slope (see
+        `from_angles`). If False, it contains the square roots of areas, which are the power 3/2 of the widths on such
+        a plane. Default: False.
     known : array_like of bool, optional
         Mask of the valid pixels, (H, W). Other pixels do not count in any window, and the map is continued into them
         (`extend`). Default: all.

@@ -21,13 +21,13 @@ class Measuring:
     Parameters
     ----------
     min_feature_size : float, optional
-        Smallest feature, in pixels at scale 1, 0.5 to 4096. Finer detail is ignored in the mask (`auto_mask`).
+        Smallest feature to measure, in pixels at scale 1, 0.5 to 4096. Finer detail is not in the mask (`auto_mask`).
         Default: 1/400 of the shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
         Model fitted robustly to the measured map (`from_mask`). Default: "plane".
     foreshortened : bool
-        If True, the image shows an oblique plane, and the map contains widths across the slope. They are the power 2/3
-        of the square roots of areas that a mask yields. Default: False.
+        If True, the image must show an oblique plane, and the map contains widths across the slope. They are computed
+        as the power 2/3 of the square roots of areas, which the mask yields. Default: False.
 
     Raises
     ------

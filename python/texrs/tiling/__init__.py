@@ -115,10 +115,10 @@ def tile(
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats. Default: both.
     size : int or (rows, columns), optional
-        Size of the result in pixels, at least 2 along an axis that wraps. A result larger than the image, at least 8
-        pixels a side, is a quilt of it. A lattice is then stretched so that it closes. If the default size is smaller
-        than the image, the report contains the reason. Default: the size of the image, or less along an axis if the
-        joint is then clearly less visible.
+        Size of the result in pixels, at least 2 along an axis that wraps. A larger result is stitched from patches of
+        the image, which must have at least 8 pixels a side. A lattice is then stretched so that it closes. If the
+        default size is smaller than the image, the report contains the reason. Default: the size of the image, or less
+        along an axis if the joint is then clearly less visible.
     overlap : int or (rows, columns), optional
         Overlap of two opposite edges in pixels, from 1 to half the side. It cannot be combined with ``size``. Default:
         the overlap with the least visible joint.

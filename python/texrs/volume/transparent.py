@@ -66,7 +66,7 @@ def render_volume(
     elevation : float
         Angle of the view above the front, in degrees, -90 to 90. Default: 30.
     transfer : str or sequence of (value, colour, alpha), optional
-        Stops of the transfer function, with increasing values, 1 to 256. Colour and alpha are interpolated linearly
+        Stops of the transfer function (1 to 256), with increasing values. Colour and alpha are interpolated linearly
         between stops. The value is the lightness, 0 to 1: integers are scaled by their full range, and floats outside
         0 to 1 by their own range. The colour is "#rrggbb", three numbers from 0 to 255, or None for the colour of the
         voxel. Alpha, 0 to 1, is the opacity of one voxel. A text has the form ``value:colour:alpha,...``, such as

@@ -134,12 +134,12 @@ def design(
     wrap : bool or (rows, columns), optional
         Axes along which the result repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of the exemplars: one number for each, 0 or more. Python also accepts a map of exemplar numbers, or a
-        map of shares for each pixel. Borders follow the outlines of elements, at most one element away from their
-        position in a map. The shares of the whole result are correct within 3 %. Default: equal shares.
+        Shares of the exemplars in the result: one number for each, 0 or more. Python also accepts a map of exemplar
+        numbers, or a map of shares for each pixel. The shares of the whole result are correct within 3 %. Borders
+        follow the outlines of elements, at most one element away from their position in a map. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number for all of
-        these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
+        Share of the result that is covered by elements of each exemplar after the first, 0 to 1. Give one number for
+        all of these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
         exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
         contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
         scattered.
@@ -318,12 +318,12 @@ def design_variants(
     wrap : bool or (rows, columns), optional
         Axes along which each texture repeats without a visible border. Default: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of the exemplars: one number for each, 0 or more. Python also accepts a map of exemplar numbers, or a
-        map of shares for each pixel. Borders follow the outlines of elements, at most one element away from their
-        position in a map. The shares of the whole result are correct within 3 %. Default: equal shares.
+        Shares of the exemplars in the result: one number for each, 0 or more. Python also accepts a map of exemplar
+        numbers, or a map of shares for each pixel. The shares of the whole result are correct within 3 %. Borders
+        follow the outlines of elements, at most one element away from their position in a map. Default: equal shares.
     density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the area that elements of each exemplar after the first cover, 0 to 1. Give one number for all of
-        these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
+        Share of the result that is covered by elements of each exemplar after the first, 0 to 1. Give one number for
+        all of these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
         exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
         contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
         scattered.

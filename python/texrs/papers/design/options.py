@@ -20,10 +20,11 @@ class DeformationOptions:
     ----------
     operations : int, optional
         Number of deformations that are applied in sequence to each element, 0 to 8. The first deformation in a heap
-        moves the element to the place of another one, turned and scaled to its shape. Further deformations turn,
-        mirror and scale the element as long as it still fills that place. On a lattice, and if elements are cells of a
-        grid, only translations are used, because other deformations would be visible. ``report["arrangement"]``
-        contains the arrangement that was found. Default: 2, but 1 in heaps and with ``method="paper"``.
+        moves the element to the place of another element, and fits it to the shape of that element. Further
+        deformations turn, mirror and scale the element as long as it still fills that place. On a lattice, and if
+        elements are cells of a grid, only translations are used, because other deformations would be visible.
+        ``report["arrangement"]`` contains the arrangement that was found. Default: 2, but 1 in heaps and with
+        ``method="paper"``.
     translate : float
         Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. Elements of a heap move to the place
         of a similar element at any distance. On a lattice, elements move at least to the nearest places. If 0,
@@ -36,22 +37,23 @@ class DeformationOptions:
     allow_mirror : bool, optional
         If True, elements, backgrounds and patches may be mirrored along both axes. If False, as for letters, they are
         not mirrored. With ``rotate=0`` the example has an upper side. Default: True, except if ``rotate`` is 0, and
-        for axes along which light or slanted elements would reveal it.
+        except along axes where light or slanted elements would reveal the mirroring.
     start : float, optional
-        Start of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
+        Initial value of the logistic map (Eq. 2), within (-1, 1). Default: drawn from the seed for each element.
     growth_rate : float
         Growth rate of the logistic map (lambda in Eq. 2), 0 to 2. Below about 1.4 the sequence is periodic. Default:
         2.
     u : int
-        Divisor u in mod(mod(h, u), v), 1 to 256. This number selects the operation; h is a value of the logistic map.
-        With ``method="paper"``, the extent is n = mod(h, u), so a larger u gives finer extents. Otherwise the extent
-        comes from another value of the map. Default: 10.
+        Divisor u in mod(mod(h, u), v), 1 to 256, which selects the operation. The value h is from the logistic map,
+        and v is the number of operations. With ``method="paper"``, the extent is n = mod(h, u), so a larger u gives
+        finer extents. Otherwise the extent comes from another value of the map. Default: 10.
     v : int
         Number of operations to choose from, 1 to 4: translation, rotation, mirror and scale, in this order. Default:
         4.
     xi : float
-        Factor that converts n to the scale factor e = xi n with ``method="paper"``, 0.001 to 2. The result is limited
-        to ``scale``. Other methods ignore xi, and draw scale factors within ``scale``. Default: 0.13.
+        Factor xi of the scale factor e = xi n with ``method="paper"``, 0.001 to 2, where n = mod(h, u). The scale
+        factor is limited to ``scale``. Other methods ignore xi, and draw scale factors within ``scale``. Default:
+        0.13.
 
     Raises
     ------

@@ -114,9 +114,9 @@ def perspective(
         across the slope) or "area" (square roots of areas). The target has the same quantity. Default: the quantity
         for which the scale map fits a plane best.
     fov : float, optional
-        Angle of view of the longer side of the exemplar in degrees, 1 to 170. It determines the foreshortening of a
-        plane, in addition to a scale map. A ``target`` that is a surface uses it, and so does ``direction``. Cannot be
-        combined with a plane as ``scale_map``, which has its own angle. Default: 60 (`texrs.planes.FOV`).
+        Angle of view of the longer side of the exemplar in degrees, 1 to 170. The foreshortening of a plane is
+        computed from this angle and the scale map. A ``target`` that is a surface uses it, and so does ``direction``.
+        Cannot be combined with a plane as ``scale_map``, which has its own angle. Default: 60 (`texrs.planes.FOV`).
     direction : float, (rows, columns) array or Field, optional
         Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. Maps of another size
         are resized. A `texrs.fields.Field` with two axes, or a text such as ``"circular"`` or
@@ -133,10 +133,10 @@ def perspective(
         copies are used. Elements on a plane have the requested size with any weight above 0, but another sharpness. If
         0, scales are ignored. Default: 1.
     augment_scales : {"auto", True, False} or sequence of float
-        Resizing of the exemplar. True flattens a plane and shows it at any depth, and copies other exemplars in other
-        sizes. "auto" does the same, but without copies if the exemplar has enough of every requested scale. False
-        replaces missing scales by the nearest existing ones, with a warning. Numbers from 1/8 to 4 are the sizes of
-        copies, and disable flattening. Default: "auto".
+        Resizing of the exemplar to all requested scales. True flattens a plane and renders it at any depth, and makes
+        copies of other exemplars in several sizes. "auto" does the same, but makes no copies if the exemplar has
+        enough of every requested scale. False replaces missing scales by the nearest existing ones, with a warning.
+        Numbers from 1/8 to 4 are the sizes of copies, and disable flattening. Default: "auto".
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. The target must also be periodic along these axes. Default: none.
     seed : int

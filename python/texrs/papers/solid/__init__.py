@@ -118,12 +118,12 @@ def solid(
     wrap : bool or (planes, rows, columns), optional
         Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
-        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
-        without elements. Default: "preserve".
+        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
+        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
+        for textures without elements. Default: "preserve".
     bend_patches : bool, optional
-        If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
-        whole, as separate elements need. Default: False if the exemplar has separate elements.
+        If True, patches bend with the field, which suits courses and nets. If False, they are rotated and scaled as a
+        whole, which suits separate elements. Default: False if the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
         Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
         Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
@@ -141,7 +141,8 @@ def solid(
         texture in space, not in voxels, and its places and lengths are in this unit. Default: the spacing that the
         exemplar's file states, else 1.
     memory_limit : int, optional
-        Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
+        Maximum memory of the computation in bytes. Default: the available memory, unless a lower limit is set
+        (`texrs.limits`).
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
         raises stops the work. True shows a progress bar.
@@ -265,17 +266,18 @@ def synthesize(
     wrap : bool or (rows, columns), optional
         Axes along which the result is periodic. Default: none.
     quality : {"preserve", "fast", "optimise"}
-        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
-        without elements. Default: "preserve".
+        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
+        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
+        for textures without elements. Default: "preserve".
     bend_patches : bool, optional
-        If True, patches bend with the field, as courses and nets need. If False, they are rotated and scaled as a
-        whole, as separate elements need. Default: False if the exemplar has separate elements.
+        If True, patches bend with the field, which suits courses and nets. If False, they are rotated and scaled as a
+        whole, which suits separate elements. Default: False if the exemplar has separate elements.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements but copy
         larger parts. "unmasked": seams may cross elements. "unmasked-large": both. "auto": each method is tried twice
         on a small image and evaluated (`texrs.metrics`), and a clearly better one replaces the default. The report key
-        "candidates" contains the measures of each. Default: "default".
+        "candidates" contains the measures of each. Default: patches of the usual size, and seams that avoid elements
+        ("default").
     method : {None, "paper", "paper-compensated"}
         Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
         Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
@@ -289,7 +291,8 @@ def synthesize(
         Interpolation between the exemplar's samples in the final look-up. Labels always use the nearest sample.
         Default: "cubic".
     memory_limit : int, optional
-        Maximum memory of the work in bytes. Default: the limits in force (`texrs.limits`).
+        Maximum memory of the computation in bytes. Default: the available memory, unless a lower limit is set
+        (`texrs.limits`).
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
         raises stops the work. True shows a progress bar.

@@ -35,13 +35,13 @@ class PlaneTexture(Texture):
         whether its values are labels and along which axes it is periodic, which are otherwise measured.
     field : Field, str, array_like or path_like, optional
         Frame field with two axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or length
-        that is not given has the default of the unbounded field. None leaves the texture as it is.
+        that the text does not state has the default for an unbounded texture. None leaves the texture as it is.
     seed : int
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     quality : {"preserve", "fast", "optimise"}
-        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
-        without elements. The three give different textures. Default: "preserve".
+        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
+        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
+        for textures without elements. The three give different textures. Default: "preserve".
     interpolation : {"nearest", "linear", "cubic"}, optional
         Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "nearest" for an
         exemplar of few colours, so that no colours are added, else "cubic".
@@ -52,7 +52,8 @@ class PlaneTexture(Texture):
         Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
         MiB.
     memory_limit : int, optional
-        Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
+        Maximum memory of one window in bytes. Default: the available memory, unless a lower limit is set
+        (`texrs.limits`).
 
     Raises
     ------
@@ -90,13 +91,13 @@ class SolidTexture(Texture):
         measured.
     field : Field, str, array_like or path_like, optional
         Frame field with three axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or
-        length that is not given has the default of the unbounded field. None leaves the texture as it is.
+        length that the text does not state has the default for an unbounded texture. None leaves the texture as it is.
     seed : int
         Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
     quality : {"preserve", "fast", "optimise"}
-        Amount of work. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
-        three times as many source positions for each patch. "fast" corrects blocks point by point, for textures
-        without elements. The three give different textures. Default: "preserve".
+        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
+        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
+        for textures without elements. The three give different textures. Default: "preserve".
     interpolation : {"nearest", "linear", "cubic"}, optional
         Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "cubic".
     spacing : (plane, row, column) float, optional
@@ -107,7 +108,8 @@ class SolidTexture(Texture):
         Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
         MiB.
     memory_limit : int, optional
-        Maximum memory of one window in bytes. Default: the limits in force (`texrs.limits`).
+        Maximum memory of one window in bytes. Default: the available memory, unless a lower limit is set
+        (`texrs.limits`).
 
     Raises
     ------

@@ -154,7 +154,7 @@ def splice(
     elements : ElementAnalysis, or (H, W) or (H, W, C) array
         Texture whose elements are used. An image is first analysed by `texrs.elements.analyse`.
     layout : ElementAnalysis, or array
-        Texture or drawn layout (`texrs.layouts`) whose arrangement the elements take.
+        Texture or drawn layout (`texrs.layouts`) that determines the positions of the elements.
     size : int or (rows, columns), optional
         Size of the result, in pixels. Default: the size of the image of ``elements``.
     seed : int
@@ -164,25 +164,25 @@ def splice(
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
         with departures from the paper.
     strength : float
-        Fraction of the way that elements move, 0 to 1. 0 keeps their own layout, and 1 uses the other layout. With 0,
-        separate elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
+        Fraction of the way that elements move, from their own layout (0) to the other layout (1). With 0, separate
+        elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
     layout_scale : float, optional
         Scale of the layout, 0.01 to 100. With 1, a pixel of the layout is a pixel of the result, and the centres of
         both images coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense
         are pushed apart. Default: the scale that fits the layout to the spacing or the size of the elements.
     align : bool, optional
-        If True, the layout is rotated so that lines of its points agree with lines of the elements. Cells and nets
-        ignore this. Default: True without ``layout_scale``.
+        If True, the layout is rotated so that lines of its points agree with lines of the elements. This has no effect
+        on cells and nets. Default: True if ``layout_scale`` is not given.
     snap_rows : bool
-        If True, targets that are nearly in a row are moved onto one line. Use it for curved walls, whose long joints
-        then become straight. Default: False.
+        If True, target positions that are nearly in a row are moved onto one line. For example, the long joints of a
+        curved wall become straight. Default: False.
     use_cells : bool, optional
         If True, a connected texture is composed of its cells. If False, its figure is bent. Default: True if cells are
         found.
     use_nets : bool, optional
-        If True, a connected texture is composed of its knots and the lines between them, also if it has cells. If
-        False, its figure is bent. Default: True if the texture has no cells and a reliable layout of at least
-        six knots, and ``use_cells`` is not given.
+        If True, a connected texture is composed of its knots and the lines between them, even if it has cells. If
+        False, its figure is bent. Default: True if the texture has no cells and a reliable layout of at least six
+        knots, and ``use_cells`` is not given.
     allow_rotation : bool, optional
         If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
     refine : bool
@@ -190,7 +190,7 @@ def splice(
         elements on their own background, are never refined. Default: True.
     screening : float, optional
         Weight of the original values when colours are corrected at the borders between elements and background, 0 to
-        1e6, see `texrs.blend`. It only affects separate elements on their background. A texture that is lit from one
+        1e6, see `texrs.blend`. This only affects separate elements on their background. A texture that is lit from one
         side gives a result that is lit in the same way. None or 0: colours are not corrected, and the image is the
         texture at the coordinates of the source map. Default: 0.01.
     progress : callable or True, optional
@@ -390,13 +390,13 @@ def self_splice(
         column], ...]}`` lists new places. A name without options is a step with its defaults. The report's "edit"
         lists the steps. Default: the layout is not changed.
     size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 along each axis. Before the steps, the texture is continued to the
-        larger size, or cropped. A larger result continues the texture's own layout, as in a splice with itself. A
-        smaller result is the middle of the texture. The steps use the element numbers of the report's "elements",
-        which lists their places before the steps. Default: the size of the image of ``elements``.
+        Size of the result, in pixels, at least 16 along each axis. Before the edit, the texture is continued to a
+        larger size, or cropped to its middle. A larger result continues the texture's own layout, as in a splice with
+        itself. A smaller result is the middle of the texture. The steps use the element numbers of the report's
+        "elements", which lists their places before the steps. Default: the size of the image of ``elements``.
     seed : int
-        Seed of all random choices, 0 to 2^64 - 1. They are random steps, elements that enter over a border, patches in
-        holes, and the noise of the refinement. Default: 0.
+        Seed of random steps, elements that enter over a border, patches in holes, and the noise of the refinement, 0
+        to 2^64 - 1. Default: 0.
     method : {None, "paper", "preview"}
         Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
         triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
@@ -405,9 +405,9 @@ def self_splice(
         If True, deformed pixels are refined. Only connected figures, and separate elements whose visible background is
         too small, are deformed. Default: True.
     screening : float, optional
-        Weight of the original values when changed colours are corrected at the borders between elements and
-        background, 0 to 1e6, as in `splice`. It only affects separate elements on their background. None or 0: colours
-        are not corrected. Default: 0.01.
+        Weight of the original values when colours are corrected where moved elements meet the background, 0 to 1e6, as
+        in `splice`. This only affects separate elements on their background. None or 0: colours are not corrected.
+        Default: 0.01.
     progress : callable or True, optional
         Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
         the work stops. True shows a progress bar. Default: none.
