@@ -39,8 +39,8 @@ class PlaneView:
         Angle of view of the longer side of the photograph in degrees, 1 to 170 (`texrs.io.read_fov`). Default: the
         angle that a command reads from the file, else the angle that the corners determine, else 60.
     ground : (H, W) array, path or Mask, optional
-        Mask of the pixels that show the plane. Default: the pixels that `texrs.planes.find_ground` finds, or all
-        pixels if the plane is given and the photograph is rectified or extended.
+        Mask of the pixels that show the plane. Default: the pixels that are found automatically
+        (`texrs.planes.find_ground`), or all pixels if the plane is given and the photograph is rectified or extended.
 
     Raises
     ------
