@@ -229,5 +229,5 @@ def test_far_and_wrong_points() -> None:
             plane.sample(points)
     with pytest.raises(texrs.errors.InvalidInput, match="interpolation"):
         plane.sample([[0, 0]], interpolation="bicubic")  # type: ignore[arg-type]
-    with pytest.raises(texrs.errors.InvalidInput, match="must be of a material"):
+    with pytest.raises(texrs.errors.InvalidInput, match="must be made from a material"):
         plane.sample_maps([[0, 0]])

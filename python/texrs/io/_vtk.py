@@ -82,7 +82,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         if len(samples) < size:
             raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {len(samples)} follow")
         if root[0].get("WholeExtent", "").split() != pieces[0].get("Extent", "").split():
-            raise FileError(f"{path}: must have one piece that spans its whole extent")
+            raise FileError(f"{path}: must have a piece of the length of its whole extent")
         shape = sides if channels == 1 else (*sides, channels)
         return np.frombuffer(samples, dtype, size // dtype.itemsize).reshape(shape).astype(dtype.newbyteorder("="))
 
