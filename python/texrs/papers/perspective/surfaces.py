@@ -67,7 +67,7 @@ def lay_out(asked: Request) -> PreparedExemplar:
     if plane is None:
         target, sheet = wanted, Copies.of(colours, asked.scale, sizes, wanted)
     else:
-        # From here on scales are widths.
+        # If the exemplar shows a plane, scales are widths from here on.
         target = power_single(wanted, plane.power)
         sheet = Flattened.of(colours, plane, target)
     frames = None if asked.turn is None else sheet.frames(target, asked.wrap, asked.turn)
@@ -119,6 +119,6 @@ def find_slope(asked: Request, colours: Floats) -> Slope | None:
     found = find_plane(colours, asked.scale, asked.kinds[0])
     if found is None:
         return None
-    # A map of widths does not determine lengths, but the angle of view does.
+    # Lengths cannot be derived from a map of widths alone, but also need the angle of view.
     lean = cos(atan(found.slope / found.scale * find_focal(asked.exemplar.shape, asked.fov)))
     return replace(found, lean=lean)

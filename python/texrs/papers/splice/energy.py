@@ -69,7 +69,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
     keys = [content_hash("energy", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
-    # Without this decoupling both axes have the same matrix, so they are solved together.
+    # If `upright` is False, both axes have the same matrix, so they are solved together.
     factors = factorise(
         {keys[axis]: partial(make_energy_triangle, rigid, at, axis, upright=upright) for axis in (0, 1)}
     )
@@ -166,7 +166,7 @@ def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> 
     """
     m = rigid if axis == 1 else rigid.T
     h, w = m.shape
-    # Pixels outside count as rigid for Figure 5.
+    # In Figure 5, pixels outside the image count as rigid.
     left = np.pad(m, ((0, 0), (1, 0)), constant_values=True)[:, :-1]
     right = np.pad(m, ((0, 0), (0, 1)), constant_values=True)[:, 1:]
     value = m + small

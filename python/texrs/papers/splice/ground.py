@@ -154,7 +154,7 @@ def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32
     moved[label[(places != here).any(axis=-1) & (label > 0)]] = True
     stays = np.zeros(int(scene.own.max()) + 2, bool)
     stays[element[(label > 0) & ~moved[label]] + 1] = True
-    # The last entry is for foreground without an element.
+    # The last entry is for foreground that belongs to no element.
     stays[-1] = not moved.any()
     still = stays[scene.own] & (scene.own != 0) & ~moved[label]
     places[still] = here[still]

@@ -303,7 +303,7 @@ def _keep_apart(
     if radius is not None:
         one, two = found.of[pairs[:, 0]], found.of[pairs[:, 1]]
         away = found.points[pairs[:, 1]] - found.points[pairs[:, 0]]
-        # Keep any two points with the offset that they have in the image.
+        # Keep pairs that have the same offset as their originals in the image, even if they are close to each other.
         copied = (np.abs(away - (points[two] - points[one])) < 1).all(axis=1)
         pairs = pairs[~copied & (np.hypot(*away.T) < closest * (radius[one] + radius[two]))]
     dropped = np.zeros(len(found.points), bool)

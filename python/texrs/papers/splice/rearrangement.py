@@ -114,7 +114,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     whole = cut_in(scene, bare, places, label, element, room=rest == 0) if label.any() else bare
     pasted, everywhere, light = label > 0, np.ones(known.shape, bool), scene.light
     nothing = np.zeros(known.shape, np.uint8)
-    # A stage shows the draft before it is filled.
+    # The draft contains the moved elements on the background before its holes are filled. A stage drawing shows it.
     before = np.where(pasted[..., np.newaxis], places, base)
     draft = Draft(before, known | pasted, everywhere, nothing, nothing, np.zeros((*known.shape, 2), bool))
     return Rearrangement(

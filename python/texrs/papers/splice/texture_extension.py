@@ -140,7 +140,7 @@ def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension
     beyond = (found.points != parts.points[found.of]).any(axis=1)
     flips = np.repeat(beyond[:, np.newaxis], 2, axis=1)
     mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
-    # Sown elements have room for themselves, but not always for their surroundings.
+    # Points were sown far enough apart for the elements, but not always for the background around each element.
     placed = _place_elements(entry, mask.shape, (found.points - low, found.of, flips), least=SOWN_FREE)
     return _stamp(entry, pixel, mask, mirrored, placed, low + offset)
 

@@ -146,7 +146,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                     };
                 }
             });
-            // Write the choices after the whole class has chosen: its points must read the places from before.
+            // Write the choices after the whole class has chosen, because its points must read the places from before.
             for (&p, &place) in class.iter().zip(&found) {
                 if places[p as usize] != place {
                     places[p as usize] = place;

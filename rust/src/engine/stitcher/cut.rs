@@ -59,7 +59,7 @@ struct Workspace<const D: usize> {
     costs: Costs,
 }
 
-/// Looks of the window's points if they take the patch.
+/// Appearance of the window's points if they take the patch.
 #[derive(Default)]
 struct Patch {
     looks: Looks,
@@ -318,7 +318,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         Ok(cutting)
     }
 
-    /// Computes the looks of the points that take the patch, where a pair needs them.
+    /// Computes the appearance of the points that take the patch, as far as pairs need it.
     fn look(&self, view: &View<D>, patch: &Proposal<'_, D>, ties: &[Tie], out: &mut Patch) {
         let n = ties.len();
         let judged = judged(&patch.window.grid, ties);

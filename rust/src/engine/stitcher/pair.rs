@@ -22,8 +22,8 @@ pub(super) struct Judge<'a, const D: usize> {
 }
 
 impl<const D: usize> Judge<'_, D> {
-    /// Computes the costs of pairs from the looks of their points and from the squared differences of colours at both
-    /// points.
+    /// Computes the costs of pairs from the appearance of their points and from the squared differences of colours at
+    /// both points.
     #[inline]
     pub(super) fn pairs(&self, l: Row<'_>, r: Row<'_>, apart: [&[f32]; 2], out: &mut [f32]) {
         let w = &self.weights;

@@ -116,7 +116,7 @@ impl<const D: usize> Source<D> {
         for &class in adjacency.classes {
             this.shares[usize::from(class)] += 1.0 / n as f64;
         }
-        // Normalise the colours before the other values of the looks are added.
+        // Normalise the colours before the other properties of the samples are added.
         this.colour(colours);
         for (i, look) in this.looks.iter_mut().enumerate() {
             look.depth = elements.depth.get(i).map_or(0.0, |d| d.clamp(0.0, DEEP));

@@ -259,7 +259,7 @@ def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: flo
     boxes = find_objects(cells.labels)
     fields, corners = [], []
     for row in shown.tolist():
-        # Treat a cell at the border as if it ended there, because its joint is unknown.
+        # Treat a cell at the image's border as if it ended at the border, because its joint is not in the image.
         signed = _measure_depth(cells.labels, row + 1, boxes[row], pad, smooth)
         fields.append(np.ascontiguousarray(np.stack([signed, *np.gradient(signed)], axis=-1), np.float32))
         corners.append([s.start - pad for s in boxes[row]])
