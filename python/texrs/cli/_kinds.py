@@ -108,9 +108,10 @@ ENTRIES = replace(
     note="Files, folders of the maps of a material, sample:NAME, or entries that texrs analyse wrote (.npz).",
     many=True,
 )
-WHITE = "White pixels are marked. In an image with transparency, opaque pixels are marked."
+WHITE = "White pixels are marked, or opaque pixels if the mask has transparency."
 WORDS = (
-    f"{WHITE} FILE:invert marks the other pixels. FILE:threshold=0.2,grow=4 acts like these options of texrs remove."
+    f"{WHITE} FILE:invert marks the other pixels. "
+    "FILE:threshold=0.2,grow=4 acts like --threshold 0.2 --grow 4 of texrs remove."
 )
 """Description of masks in the help."""
 MASK = Kind("FILE", lambda path, about: fit_volume(read_mask(path, about.axes), path, about), WORDS, file=True)
@@ -150,7 +151,7 @@ MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs 
 SEEN = Kind(
     "FILE|auto",
     lambda text, about: text if text.startswith(PLANE) else read_scale_map(text),
-    "A file that texrs scale-map wrote, auto (measured), front (no perspective), or plane:slant=50,tilt=90.",
+    "A file that texrs scale-map wrote, auto, front (no perspective), or plane:slant=50,tilt=90.",
     file=True,
     words=("auto", "front"),
 )

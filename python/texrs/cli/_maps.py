@@ -51,7 +51,7 @@ def apply_command(
     source: Annotated[str, make_argument("MAP.npz", "Source map that the option --source-map of a command wrote.")],
     maps: Annotated[
         list[str],
-        make_argument("IMAGE", "Images with the same pixels as the exemplar, such as its heights or normals."),
+        make_argument("IMAGE", "Images that are aligned with the exemplar, such as its heights or normals."),
     ],
     out: Annotated[str, to_write("out", text="Image or .zarr file to write, or a folder for several images.")],
     given: dict[str, Any],

@@ -153,7 +153,7 @@ def rerun_command(
     context: typer.Context,
     output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote, or a folder that one command wrote.")],
     out: Annotated[
-        str | None, to_write("out", text="Path for the new result. Default: it is only compared with OUTPUT.")
+        str | None, to_write("out", text="Path for the new result. Default: the result is only compared with OUTPUT.")
     ] = None,
     count: Threads = None,
     quiet: Quiet = False,

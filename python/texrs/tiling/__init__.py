@@ -127,7 +127,7 @@ def tile(
         correction wider. None or 0: no correction, so that each pixel is a pixel of the image. See `texrs.blend`.
         Default: no correction.
     flatten_lighting : bool, optional
-        If True, uneven light is evened out first, as far as there is evidence of it. Only the colours of a material
+        If True, uneven light is evened out first, as far as it cannot be due to chance. Only the colours of a material
         are changed. See `texrs.materials.flatten_lighting`. Default: True if one part is lit at least 1.6 times
         brighter than another part, and no side is shorter than 128 pixels.
     progress : callable or True, optional

@@ -380,15 +380,15 @@ def self_splice(
         Texture to edit. An image is first analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings, optional
         Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. Python accepts
-        plain JSON types. ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` scales the layout, not the elements.
-        ``{"op": "shift", "by": [4, 0]}`` moves all elements by rows and columns, in pixels. ``{"op": "rows", "by":
-        6}`` moves every other row to the right and the other rows to the left. ``{"op": "randomise", "amount": 0.25,
-        "least": 0.7}`` adds Gaussian displacements with a standard deviation of 0.25 spacings. The minimum distance of
-        elements is then 0.7 of the usual minimum. ``{"op": "regularise", "amount": 1}`` moves elements onto the
-        lattice that fits best. ``{"op": "move", "element": 3, "by": [0, 8]}`` moves one element; ``"to"`` gives its
-        new place instead. ``{"op": "remove", "element": 3}`` removes one element. ``{"op": "points", "points": [[row,
-        column], ...]}`` lists new places. A name without options is a step with its defaults. The report's "edit"
-        lists the steps. Default: the layout is not changed.
+        plain JSON types. Steps change the layout, but not the size of elements.  ``{"op": "scale", "factor": 1.2}`` or
+        ``[1.2, 1]`` scales the layout, not the elements. ``{"op": "shift", "by": [4, 0]}`` moves all elements by rows
+        and columns, in pixels. ``{"op": "rows", "by": 6}`` moves every other row to the right and the other rows to
+        the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian displacements with a standard
+        deviation of 0.25 spacings. The minimum distance of elements is then 0.7 of the usual minimum. ``{"op":
+        "regularise", "amount": 1}`` moves elements onto the lattice that fits best. ``{"op": "move", "element": 3,
+        "by": [0, 8]}`` moves one element; ``"to"`` gives its new place instead. ``{"op": "remove", "element": 3}``
+        removes one element. ``{"op": "points", "points": [[row, column], ...]}`` lists new places. A name without
+        options is a step with its defaults. The report's "edit" lists the steps. Default: the layout is not changed.
     size : int or (rows, columns), optional
         Size of the result, in pixels, at least 16 along each axis. Before the edit, the texture is continued to a
         larger size, or cropped to its middle. A larger result continues the texture's own layout, as in a splice with
