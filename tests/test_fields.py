@@ -289,7 +289,7 @@ def narrowing(points):
         (lambda: fields.check(fields.identity(), 2.5), "shape"),
         (lambda: fields.check(fields.identity(), (3, 3, 3), "here"), "origin"),
         (lambda: fields.identity().over((3, 3)), "shape"),
-        (lambda: fields.check(fields.identity(), (3, 3)), "must have 2 axes, as the requested size, got 3"),
+        (lambda: fields.check(fields.identity(), (3, 3)), "must have 2 axes, like the requested size, got 3"),
         (lambda: fields.check(np.eye(3), (3, 3, 3)), "must be a field"),
         (lambda: fields.check(fields.from_function(narrowing), (2, 2, 300)), "field: the frame at"),
     ],

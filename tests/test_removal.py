@@ -249,7 +249,7 @@ MARKED[70:90, 60:90] = True
     ("make", "words"),
     [
         (lambda: texrs.remove(FLOOR, ~(MARKED | True)), "mask: marks nothing"),
-        (lambda: texrs.remove(FLOOR, MARKED | True), "mask: must leave pixels to fill from"),
+        (lambda: texrs.remove(FLOOR, MARKED | True), "mask: must leave pixels to copy from"),
         (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
         (
             lambda: texrs.remove(FLOOR, MARKED, view=PlaneView(ground=MARKED)),

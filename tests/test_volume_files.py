@@ -368,7 +368,7 @@ def test_pictures_are_not_volumes(tmp_path, suffix):
         (lambda p: tio.write_volume(p / "a.nrrd", np.zeros((2, 2, 2, 65))), "65 channels"),
         (lambda p: tio.write_volume(p / "a.gz", np.zeros((2, 2, 2))), "got '.gz'"),
         (lambda p: tio.write_surface(p / "a.obj", np.eye(3), [(0, 1, 2)]), "got '.obj'"),
-        (lambda p: tio.write_surface(p / "a.stl", np.eye(3), [(0, 1, 3)]), "corners from 0 to 2"),
+        (lambda p: tio.write_surface(p / "a.stl", np.eye(3), [(0, 1, 3)]), "indices of vertices from 0 to 2"),
         (lambda p: tio.write_surface(p / "a.stl", np.eye(3), np.zeros((0, 3), int)), "at least one"),
         (lambda p: tio.write_surface(p / "a.stl", np.eye(3) * np.nan, [(0, 1, 2)]), "finite"),
         (lambda p: tio.write_surface(p / "a.stl", np.eye(2), [(0, 1, 2)]), "vertices"),

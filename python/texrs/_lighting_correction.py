@@ -92,7 +92,7 @@ def flatten_lighting(
         as_choice(space, "space", ("srgb", "linear"))
     encoding = space or usual
     if pixels.dtype == np.bool_:
-        raise InvalidInput("image: must be colours, got bool")
+        raise InvalidInput("image: must be colours as integers or floats, got bool")
     clear = channels in (2, 4)
     colours = channels - clear
     seen = pixels[..., :colours]

@@ -421,7 +421,7 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
     if not isinstance(field, Field):
         raise InvalidInput(f"field: must be a field of texrs.fields, got {type(field).__name__}")
     if isinstance(shape, Sequence) and len(shape) != field.axes:
-        raise InvalidInput(f"field: must have {len(shape)} axes, as the requested size, got {field.axes}")
+        raise InvalidInput(f"field: must have {len(shape)} axes, like the requested size, got {field.axes}")
     sides = as_size(shape, "shape", axes=field.axes)
     most = 32 if field.axes == 3 else 181
     start = as_place(origin, field.axes, "origin")

@@ -154,7 +154,7 @@ def match_layouts(
     extension = _extend_until(a, size, unit, SPARE * most)
     if len(extension.points) < most:
         raise InvalidInput(
-            f"elements: must have {most} elements within reach, got {len(extension.points)}; "
+            f"elements: must give at least {most} elements for this size, got {len(extension.points)}; "
             "take a smaller size or a larger image"
         )
     best: Match | None = None
