@@ -231,7 +231,7 @@ impl Appearance {
         }))
     }
 
-    /// Initialises the coordinates of a region: each cell gets a matching patch of the exemplar.
+    /// Initialises the coordinates of a region by filling each cell with a matching patch of the exemplar.
     #[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
     fn blocks<'py>(
         &self,

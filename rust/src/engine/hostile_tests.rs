@@ -82,7 +82,7 @@ fn region<const D: usize>(numbers: &Numbers) -> Result<Region<D>> {
         std::array::from_fn(|a| wrap[a]),
     )?;
     let region = Region::new(grid, std::array::from_fn(|a| origin[a]))?;
-    // Skip large regions: they are valid, but would take long.
+    // Skip large regions. They are valid, but would take long.
     if region.grid.len() > 4096 {
         return Err(Error::value("shape", "not tried"));
     }

@@ -24,7 +24,7 @@ pub fn upsample<const D: usize>(
     frames: Frames<'_, D>,
 ) -> Result<Vec<Place<D>>> {
     let (coarse, fine) = (from.grid.shape(), to.grid.shape());
-    // Missing parents are an error: they would change the result.
+    // Missing parents are an error, because they would change the result.
     for axis in 0..D {
         let first = to.origin[axis].div_euclid(2) - from.origin[axis];
         let last = (to.origin[axis] + fine[axis] as i32 - 1).div_euclid(2) - from.origin[axis];

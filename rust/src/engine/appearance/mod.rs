@@ -55,7 +55,7 @@ const SIGMA: f64 = 2.0;
 const SAMPLES: usize = 6000;
 /// Maximum variance of the windows of an exemplar that counts as uniform, in squared colour steps.
 const FLAT: f64 = 1e-3;
-/// Maximum number of values in a window: the components come from a square matrix of this side.
+/// Maximum number of values in a window, because the components are computed from a square matrix of this side.
 const LONGEST: usize = 2048;
 /// Number of 16-bit values in a register.
 const LANES: usize = 16;
@@ -76,7 +76,7 @@ pub struct Appearance<const D: usize> {
     offsets: Vec<[i32; D]>,
     projection: Projection,
     features: Vec<Line>,
-    /// Median distance from a window to the nearest other window: closer windows count as equal.
+    /// Median distance from a window to the nearest other window. Windows closer than this count as equal.
     spacing: i32,
 }
 
@@ -233,7 +233,8 @@ impl<const D: usize> Appearance<D> {
         at
     }
 
-    /// Moves a place to where its window is inside the exemplar: wraps periodic axes, and clamps the others.
+    /// Moves a place to where its window is inside the exemplar. Periodic axes wrap, and places are clamped along the
+    /// others.
     #[inline(always)]
     pub fn bring_inside(&self, mut place: Place<D>) -> Place<D> {
         for axis in 0..D {
@@ -399,7 +400,7 @@ impl<const D: usize> Appearance<D> {
     fn nearest_other(&self, me: [i32; D], apart: i32) -> i32 {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
         let mine = self.features[self.clamped(me)].0;
-        // Go line by line: only the last axis needs a check for each sample.
+        // Search line by line, because then only the last axis needs a check for each sample.
         let columns = self.range(D - 1);
         let lines = self.grid.len() / shape[D - 1];
         let mut best = i32::MAX;

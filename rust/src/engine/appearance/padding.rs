@@ -3,7 +3,8 @@
 use super::Colour;
 use crate::foundation::grid::Grid;
 
-/// Colours of an exemplar with a margin: it wraps around periodic axes and repeats the border along the others.
+/// Colours of an exemplar with a margin. The margin wraps around periodic axes and repeats the border along the
+/// others.
 #[derive(Debug, Clone)]
 pub struct Padding<const D: usize> {
     colours: Vec<Colour>,

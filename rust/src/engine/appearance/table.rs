@@ -57,7 +57,7 @@ impl<const D: usize> Appearance<D> {
             0
         };
         let padded = length.next_multiple_of(LANES);
-        // Check everything that the unchecked integer arithmetic relies on: stored arrays may be damaged.
+        // Check all conditions of the unchecked integer arithmetic, because stored arrays may be damaged.
         let sums_fit = parts
             .basis
             .chunks(padded.max(1))

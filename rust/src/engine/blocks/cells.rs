@@ -46,7 +46,8 @@ impl<const D: usize> Cells<D> {
                 counts[axis] = ((n + options.cell / 2) / options.cell).max(1);
                 sides[axis] = n as f64 / counts[axis] as f64;
             } else {
-                // Add a cell on both sides: centres are shifted, so a cell outside the region may own points inside.
+                // Add a cell on both sides, because centres are shifted and a cell outside the region may own points
+                // inside.
                 first[axis] = region.origin[axis].div_euclid(side) - 1;
                 let last = (region.origin[axis] + n as i32 - 1).div_euclid(side) + 1;
                 counts[axis] = (last - first[axis] + 1) as usize;
@@ -117,7 +118,7 @@ impl<const D: usize> Cells<D> {
         let grid = &self.region.grid;
         let mut owners = memory::filled("the points of cells", 0u32, grid.len())?;
         par::chunks_mut(&mut owners, CHUNK, |chunk, owners| {
-            // Reuse the neighbours of the previous point: consecutive points mostly fall into the same cell.
+            // Reuse the neighbours of the previous point, because consecutive points mostly fall into the same cell.
             let (mut seen, mut around) = (None, Vec::new());
             for (i, owner) in owners.iter_mut().enumerate() {
                 let world = self.region.world(grid.point(chunk * CHUNK + i));

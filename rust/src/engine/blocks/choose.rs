@@ -113,7 +113,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
     /// Returns the surroundings of the cell.
     pub(super) fn around<'c>(&self, places: &[Place<D>], contrasts: &'c [i32]) -> Around<'c, D> {
         let shell = self.cell.shell.iter().map(|&(q, step)| Beyond {
-            // Round the step alone: patches are placed on whole samples, so the result is the same for all candidates.
+            // Round the step alone. Patches are placed on whole samples, so the result is the same for all candidates.
             step: nearest(apply(&self.cell.frame, step)),
             there: self.appearance.clamped(nearest(places[q as usize])),
         });

@@ -127,7 +127,8 @@ pub(super) mod v3 {
     use super::{Block, Boxes, Found, PAIRS, Query, WIDTH};
     use crate::foundation::simd::{V3, cast};
 
-    // Vectorise these functions themselves: the compiler does not inline all of a search into its vectorised caller.
+    // Vectorise these functions themselves, because the compiler does not inline all of a search into its vectorised
+    // caller.
     #[inline(always)]
     pub(in super::super) fn distances(simd: V3, block: &Block, query: &Query, limit: i32) -> Found {
         simd.vectorize(

@@ -51,8 +51,8 @@ type Seen<const N: usize> = ([i16; N], i32);
 /// The inputs and tables of a correction.
 pub(super) struct Level<'a, const D: usize, const N: usize> {
     appearance: &'a Appearance<D>,
-    /// `k` substitutes for each sample, as packed coordinates: computing them from positions needs divisions, the
-    /// costliest step here.
+    /// `k` substitutes for each sample, as packed coordinates. Computing coordinates from positions would need
+    /// divisions, the costliest step here.
     sets: Vec<u64>,
     k: usize,
     region: &'a Region<D>,
@@ -121,7 +121,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             let before = now.saturating_sub(1 << D);
             let mut found = vec![[0; D]; class.len()];
             par::chunks_mut(&mut found, SHARE, |chunk, found| {
-                // Reuse the corners of the previous point: neighbours mostly have the same frame.
+                // Reuse the corners of the previous point, because neighbours mostly have the same frame.
                 let mut last = constant.map(|corners| (None, corners));
                 for (i, place) in found.iter_mut().enumerate() {
                     let p = class[chunk * SHARE + i] as usize;
@@ -132,8 +132,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                         _ => self.corners(&self.frames.at(p)),
                     };
                     last = Some((frame, corners));
-                    // Skip a point if its neighbours have not changed since its last choice: the choice depends only
-                    // on them.
+                    // Skip a point if its neighbours have not changed since its last choice, because the choice
+                    // depends only on them.
                     let stirred = |corner: &Corner<D>| {
                         self.region
                             .step(point, corner.step)
@@ -254,7 +254,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                 if wanted.is_some_and(|kind| self.kinds.samples[number] != kind) {
                     continue;
                 }
-                // Skip duplicates: within a patch of the exemplar, neighbours propose the same candidates in the same
+                // Skip duplicates. Within a patch of the exemplar, neighbours propose the same candidates in the same
                 // order.
                 let centre = self.table.at(self.settle(there));
                 if std::mem::replace(before, centre) == centre {
@@ -265,7 +265,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             }
         }
         let candidates = &candidates[..count];
-        // Pass the usual numbers of neighbours as arrays: then the compiler keeps their vectors in registers.
+        // Pass the usual numbers of neighbours as arrays, so that the compiler keeps their vectors in registers.
         let best = if let Ok(seen) = <&[Seen<N>; 8]>::try_from(seen) {
             self.least(seen, candidates)
         } else if let Ok(seen) = <&[Seen<N>; 4]>::try_from(seen) {
@@ -281,7 +281,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
     fn least(&self, seen: &[Seen<N>], candidates: &[(Place<D>, i32)]) -> Option<Place<D>> {
         let (mut best, mut least) = (None, u32::MAX);
         for &(candidate, centre) in candidates {
-            // Sum all differences: this costs less than a check after each for a sum that is already too large.
+            // Sum all differences. After each difference, a check whether the sum is already too large would cost
+            // more.
             let cost = seen.iter().fold([0; LANES], |sums, (vector, beside)| {
                 added(
                     sums,

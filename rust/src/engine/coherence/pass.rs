@@ -87,7 +87,7 @@ pub fn correct<const D: usize>(
         check_shape(argument, &[wanted], length)?;
     }
     memory::room("the similarity sets", similarity.sets.len(), 8)?;
-    // Compute the flag once for each sample: divisions are the costliest step here.
+    // Compute the flag once for each sample, because divisions are the costliest step here.
     let inside: Vec<bool> = (0..samples)
         .map(|s| {
             let sample = appearance.grid().point(s).map(|x| x as i32);

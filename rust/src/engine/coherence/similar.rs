@@ -81,7 +81,7 @@ fn search<const D: usize, const N: usize>(
     let far = |a: [i32; D], b: [i32; D]| far(appearance, a, b, (n / 2) as i32);
 
     monitor.expect(tree.leaves() as u64);
-    // Search leaf by leaf: the vectors of a leaf visit the same boxes, which are still in the cache.
+    // Search leaf by leaf, because the vectors of a leaf visit the same boxes, which are still in the cache.
     let found = par::map(tree.leaves(), |leaf| {
         monitor.check()?;
         let mut sets = Vec::with_capacity(tree.places(leaf).len() * k);

@@ -6,7 +6,7 @@ use crate::foundation::par;
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use crate::foundation::simd::V3;
 
-/// Number of vectors in a leaf: a leaf has as many blocks as a node has children.
+/// Number of vectors in a leaf. A leaf has as many blocks as a node has children.
 const LEAF: usize = WIDTH * WIDTH;
 /// Number of vectors above which both halves are arranged in parallel.
 const APART: usize = 1024;
@@ -155,7 +155,7 @@ impl<const D: usize, const N: usize> Tree<D, N> {
         while height > 0 {
             height -= 1;
             let (bound, least, level, at) = stack[height];
-            // Compare numbers as well as bounds: then equal vectors end the search at the first one.
+            // Compare numbers as well as bounds, so that a search among equal vectors ends at the first one.
             if (bound, least) >= best {
                 continue;
             }
@@ -186,8 +186,8 @@ impl<const D: usize, const N: usize> Tree<D, N> {
     }
 }
 
-/// Sorts items into nested boxes: splits them in half along the widest side, at a multiple of `unit`, and repeats with
-/// smaller units.
+/// Sorts items into nested boxes. It splits them in half along the widest side, at a multiple of `unit`, and repeats
+/// this with smaller units.
 fn arrange<const D: usize, const N: usize>(items: &mut [Place<D, N>], mut unit: usize) {
     while unit >= items.len() {
         unit /= WIDTH;
@@ -200,7 +200,7 @@ fn arrange<const D: usize, const N: usize>(items: &mut [Place<D, N>], mut unit: 
         .max_by_key(|&k| i32::from(bounds[k].1) - i32::from(bounds[k].0))
         .unwrap_or(0);
     let middle = items.len().div_ceil(unit) / 2 * unit;
-    // Order equal values by number: then the lowest number of equal vectors is still found at once.
+    // Order equal values by number, so that the lowest number of equal vectors is still found at once.
     items.select_nth_unstable_by_key(middle, |item| (item.vector[widest], item.number));
     let large = items.len() > APART;
     let (low, high) = items.split_at_mut(middle);

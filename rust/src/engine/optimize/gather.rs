@@ -8,8 +8,8 @@ use crate::foundation::fixed::{
 use crate::foundation::par;
 use std::ops::Range;
 
-/// The colours of a range of the output and of the points within the reach of windows. Only filled if all frames are
-/// the identity: then a window is a box of these colours.
+/// The colours of a range of the output and of the points within the reach of windows. This is only filled if all
+/// frames are the identity, because then a window is a box of these colours.
 #[derive(Default)]
 pub(super) struct Seen {
     first: usize,
@@ -138,7 +138,7 @@ impl<'a, const D: usize> Eye<'a, D> {
             Look { step, across, rest }
         }));
         self.frame = Some(frame);
-        // Skip the checks if the remainders are short: places are inside, and the margin of the exemplar is wider than
+        // Skip the checks if the remainders are short. Places are inside, and the margin of the exemplar is wider than
         // windows.
         let near = frame == identity()
             || frame

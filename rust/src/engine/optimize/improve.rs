@@ -110,7 +110,7 @@ impl<const D: usize> Level<'_, D> {
                 beside = count;
             }
         }
-        // The coherence cost of a place: the adjacent proposals that belong to another patch.
+        // The coherence cost of a place, from the number of adjacent proposals that belong to another patch.
         let apart = |place: Place<D>| -> i64 {
             if search.coherence == 0 {
                 return 0;
@@ -129,8 +129,8 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
-        // Stop here if no random match can be better by the limit: windows of the exemplar are hardly ever nearer than
-        // their spacing.
+        // Stop here if no random match can be better by the limit, because windows of the exemplar are rarely nearer
+        // than their spacing.
         if least <= search.limit + search.limit / 2 {
             return best;
         }

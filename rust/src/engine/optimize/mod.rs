@@ -161,7 +161,7 @@ pub fn correct<const D: usize>(
             level.recent.spread(&region.grid);
         }
     }
-    // After an odd number of passes the result is in a buffer of this function: copy it to the caller's.
+    // After an odd number of passes, the result is in a buffer of this function. Copy it to the caller's array.
     if done % 2 == 1 {
         let places = if options.vote > 0 { elected } else { matches };
         places.copy_from_slice(before);

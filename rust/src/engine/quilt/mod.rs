@@ -81,7 +81,7 @@ pub struct Quilt<'a> {
     pixels: Pixels,
     channels: usize,
     whole: Index,
-    /// The images at half the size. None if an axis is fixed: then all places are compared exactly.
+    /// The images at half the size. `None` if an axis is fixed, because then all places are compared exactly.
     half: Option<Index>,
     /// The image pixel that each pixel of the texture shows, as a position among the pixels of all images, or
     /// [`FREE`].

@@ -199,7 +199,8 @@ impl<const D: usize> Stitching<'_, D> {
         points.map(|(&p, &m)| m && self.canvas.covered(p)).collect()
     }
 
-    /// Finds the best patch of a chart: candidates fit the known points, and the cheapest after the cut is returned.
+    /// Finds the best patch of a chart. Candidates fit the known points, and the candidate with the cheapest cut is
+    /// returned.
     pub(super) fn find(
         &self,
         chart: Chart<D>,

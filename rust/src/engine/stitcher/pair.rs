@@ -1,6 +1,6 @@
 //! Costs of pairs of neighbouring points, for rows of pairs at once.
 //!
-//! All seam costs are defined here. Rows are judged term by term: each term is one vectorised pass over buffers that
+//! All seam costs are defined here. Rows are judged term by term. Each term is one vectorised pass over buffers that
 //! stay in the first-level cache.
 
 use super::source::{CHANNELS, Source};

@@ -23,8 +23,8 @@ impl Index {
     pub fn good(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
         check_pick(pick)?;
         let fits = |e: &Exemplar| (0..2).all(|axis| query.shape[axis] <= e.shape[axis]);
-        // An invalid query is passed to the full search, which reports the error. The order of the tests matters: the
-        // product is computed only for sides that fit.
+        // An invalid query is passed to the full search, which reports the error. The order of the tests matters,
+        // because the product is computed only for sides that fit.
         let sound = query.shape.iter().all(|&n| n >= 2 * LEAST)
             && self.exemplars.iter().any(fits)
             && query.weight.len() == query.shape[0] * query.shape[1]

@@ -9,8 +9,8 @@
 //! therefore the exact minimum. It does not depend on the number of threads, the block size or the
 //! CPU. Ties go to the lowest (exemplar, row, column).
 //!
-//! Means are removed before the transforms, which makes the bound tight: on photographs only a
-//! handful of positions remain.
+//! Means are removed before the transforms, which makes the bound tight. On photographs, only a handful of positions
+//! remain.
 
 mod checks;
 mod costs;
@@ -119,8 +119,8 @@ struct Block {
     corner: [usize; 2],
 }
 
-/// Buffers that are kept for reuse. It never waits: if the lock is held elsewhere, or in the parent
-/// of a fork, the caller gets a new buffer.
+/// Buffers that are kept for reuse. The pool never waits. If the lock is held elsewhere, or in the parent of a fork,
+/// the caller gets a new buffer.
 struct Pool<T>(Mutex<Vec<T>>);
 
 impl<T: Default> Pool<T> {

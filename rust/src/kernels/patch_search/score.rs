@@ -278,7 +278,7 @@ fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], sam
     let (w, w_rest) = weight.as_chunks::<LANES>();
     let (s, s_rest) = samples.as_chunks::<LANES>();
     let mut sums: [__m256d; 2] = cast(*lanes);
-    // Avoid closures: one that is not inlined would turn single instructions into calls.
+    // Avoid closures, because a closure that is not inlined would turn single instructions into calls.
     for ((p, w), s) in p.iter().zip(w).zip(s) {
         let p: [__m128; 2] = cast(*p);
         let w: [__m128; 2] = cast(*w);

@@ -65,7 +65,7 @@ pub struct Problem<'a> {
 /// Maximum screening. Beyond it the solution is 0 in `f32`, and larger values would overflow.
 const STRONGEST: f64 = 1e30;
 
-/// Number of rows of a task: as many as are transformed together.
+/// Number of rows of a task. The transforms of a task are computed together.
 const ROWS: usize = 2 * LANES;
 
 /// Returns the solution. Without screening and without fixed pixels, it has the mean of the image.

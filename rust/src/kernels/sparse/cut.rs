@@ -137,8 +137,8 @@ impl Scratch {
         cut
     }
 
-    /// Returns the hubs of a part in order: unknowns that are coupled to many more unknowns of the
-    /// part than usual.
+    /// Returns the hubs of a part in order. A hub is coupled to many more unknowns of the part than the average
+    /// unknown.
     fn list_hubs(&self, part: &[Item], links: &Links) -> Vec<u32> {
         let inside = |&&other: &&u32| self.level[other as usize] != NONE;
         let degree = |item: &Item| links.of(item[1]).iter().filter(inside).count();

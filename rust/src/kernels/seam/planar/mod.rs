@@ -17,9 +17,9 @@
 //! 4. such paths need not cross each other, so each path splits the strip. The faces of P to its
 //!    left and right are searched only on their side.
 //!
-//! Departure from the paper: distances from the bottom of the opened strip are computed once. They
-//! guide every search (A*) and are lower bounds of the seams through each face of P. Faces that
-//! cannot do better are not searched. On natural images, a few of hundreds of searches remain.
+//! Departure from the paper: distances from the bottom of the opened strip are computed once. They guide every search
+//! (A*) and are lower bounds of the seams through each face of P. Faces that cannot have a cheaper seam are not
+//! searched. On natural images, a few out of hundreds of searches remain.
 //!
 //! A seam around a core ([`ring`]) is the same problem on an annulus, with P from its rim to the
 //! core.
@@ -45,11 +45,11 @@ pub struct Strip<'a> {
     pub columns: usize,
     /// Whether the first row follows the last one.
     pub cyclic: bool,
-    /// Cost of separating each pixel from the next one in its row: rows x columns, the last column
-    /// is ignored.
+    /// Cost of separating each pixel from the next one in its row, an array of rows x columns. The last column is
+    /// ignored.
     pub across: &'a [u32],
-    /// Cost of separating each pixel from the next one in its column: rows x columns. The last row is ignored unless
-    /// the rows wrap around.
+    /// Cost of separating each pixel from the next one in its column, an array of rows x columns. The last row is
+    /// ignored unless the rows wrap around.
     pub along: &'a [u32],
 }
 
