@@ -1,8 +1,8 @@
-"""Compute many results with any workers, and store each once in a Zarr store.
+"""Compute many results with any workers, and store each result once in a Zarr store.
 
 Requires the extra: ``pip install texrs[dask]``. The caller chooses the scheduler: this process, several processes of
 this machine, or a Dask cluster. Only the exemplar's pixels, the options and their digest are sent to workers. Each
-worker analyses the exemplar once, and has one pool of threads. `texrs.SolidTexture.estimate_memory` gives the memory
+worker analyses the exemplar once, and has one pool of threads. `texrs.SolidTexture.estimate_memory` returns the memory
 of a worker in advance.
 
 Notes
@@ -62,8 +62,8 @@ def map_to_zarr(
 ) -> Stored:
     """Compute a function for each item, and stream the results to a Zarr store.
 
-    An item may be a seed of a variant, for example. A result is stored completely or not at all, and each is computed
-    once. The same call continues a run that was stopped for any reason.
+    An item may be the seed of a variant, for example. Each result is computed once, and stored completely or not at
+    all. The same call continues a run that was stopped for any reason.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def map_to_zarr(
     shape : int or sequence of int, optional
         Arrangement of the items, such as (20, 20) for a matrix of sources and targets, row by row. Default: one row.
     key : str, optional
-        Identifier of the computation. A store with another key is refused. Default: a digest of the function and the
-        items.
+        Identifier of the computation. A store with another key raises an error. Default: a digest of the function and
+        the items.
     scheduler : None, int, str or distributed.Client
         {scheduler}
     threads : int, optional
@@ -98,7 +98,7 @@ def map_to_zarr(
     Raises
     ------
     Failed
-        If some items failed. The others are stored.
+        If some items failed. The results of the other items are stored.
     WorkerLost
         If an item ended three workers.
     InvalidInput
@@ -142,7 +142,7 @@ def open_store(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     name : str, optional
         Name of the map. Required if there are several.
     level : int
-        Resolution level of an image. Default: 0, the finest.
+        Resolution level of an image, from 0. Default: 0, the finest.
 
     Returns
     -------

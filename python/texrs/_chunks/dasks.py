@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 __all__ = ["import_dask", "make_dask"]
 
 MOST = 2**20
-"""Maximum number of blocks of an array, because Dask keeps a list of all."""
+"""Maximum number of blocks of an array, because Dask keeps a list of all blocks."""
 
 
 def import_dask() -> Any:

@@ -39,7 +39,7 @@ __all__ = ["HEADER", "RAW", "Filled", "check_suffix", "fill"]
 HEADER = ".nhdr"
 """Suffix of the NRRD header next to a file of raw samples, which describes them."""
 BLOCK = 2**24
-"""Bytes per write if the system cannot allocate disk space in advance."""
+"""Number of bytes per write if the system cannot allocate disk space in advance."""
 LARGEST = 2**63 - 1
 """Maximum number of bytes of a file on any system."""
 
@@ -53,7 +53,7 @@ class Filled:
     part : pathlib.Path
         Path of the part file.
     start : int
-        Bytes of the header before the samples.
+        Number of bytes of the header before the samples.
     shape : tuple of int
         Shape of the array, channels last.
     dtype : numpy.dtype
@@ -294,7 +294,7 @@ def _read_journal(part: FilePath, line: str, count: int) -> set[int] | None:
 
 
 def _take_room(part: FilePath, header: bytes, size: int) -> None:
-    """Create a file of a header and ``size`` bytes, allocated on the disk. Later writes cannot run out of space."""
+    """Create a file of a header and ``size`` bytes. Allocate its disk space, so that later writes cannot fail."""
     _name_journal(part).unlink(missing_ok=True)
     whole = len(header) + size
     if whole > LARGEST:

@@ -15,7 +15,7 @@ from texrs.errors import InvalidInput
 __all__ = ["Box", "Grid", "as_sides"]
 
 MOST = 2**40
-"""Exclusive limit of the samples along an axis."""
+"""Number of samples along an axis that an array must stay below."""
 CHUNK = {2: 512, 3: 128}
 """Default side of a chunk in samples, by the number of axes."""
 
@@ -30,9 +30,9 @@ class Grid:
     Attributes
     ----------
     shape : tuple of int
-        Samples along each axis.
+        Number of samples along each axis.
     chunks : tuple of int
-        Samples of a chunk along each axis. The last chunk along an axis may be shorter.
+        Number of samples of a chunk along each axis. The last chunk along an axis may be shorter.
 
     Examples
     --------

@@ -30,11 +30,11 @@ class Part:
     Attributes
     ----------
     reader : Reader
-        Source of any box of the part.
+        Source of the chunks of the part.
     origin : tuple of int
         Position of the first sample in the coordinates of the unbounded texture.
     base : str
-        Name of the map that shows the texture, such as the base colour.
+        Name of the map that the user sees first, such as the base colour.
 
     """
 
@@ -43,7 +43,7 @@ class Part:
     base: str
 
     def name(self, map: str | None) -> str:
-        """Check the name of a map. None is the map that shows the texture."""
+        """Check the name of a map. None selects the base map."""
         if map is not None and (not isinstance(map, str) or map not in self.reader.maps):
             raise InvalidInput(f"map: must be one of {', '.join(self.reader.maps)}; got {map!r}")
         return map or self.base
@@ -74,12 +74,12 @@ class InParts(ABC):
         Parameters
         ----------
         shape : int or sequence of int
-            Samples along each axis.
+            Number of samples along each axis.
         chunks : int or sequence of int, optional
-            Samples of a block along each axis. Larger blocks take more memory, but repeat less work along their
-            borders. Default: 512 for images, 128 for volumes.
+            Number of samples of a block along each axis. Larger blocks take more memory, but repeat less work along
+            their borders. Default: 512 for images, 128 for volumes.
         origin : int or sequence of int
-            First sample, in the coordinates of the unbounded texture. Default: 0.
+            Position of the first sample, in the coordinates of the unbounded texture. Default: 0.
         map : str, optional
             {map}
 
@@ -134,11 +134,11 @@ class InParts(ABC):
             Folder of the store. The workers must also have access to it. Each map of a material is a group. The axes
             are (c, z, y, x), as OME-Zarr requires. `texrs.stores.open_store` returns them with channels last.
         shape : int or sequence of int
-            Samples along each axis.
+            Number of samples along each axis.
         chunks : int or sequence of int, optional
             {chunks}
         origin : int or sequence of int
-            First sample, in the coordinates of the unbounded texture. Default: 0.
+            Position of the first sample, in the coordinates of the unbounded texture. Default: 0.
         levels : int, optional
             {levels}
         spacing : sequence of float, optional
@@ -217,15 +217,15 @@ class InParts(ABC):
         Parameters
         ----------
         path : path_like
-            Path of the file. ``.npy``, ``.tif`` and ``.raw`` can have any size. A header ``.nhdr`` is written next to
-            ``.raw``, which NRRD readers open. Other formats of `texrs.io.write` and `texrs.io.write_volume` are in
-            memory once, at the end.
+            Path of the file. ``.npy``, ``.tif`` and ``.raw`` can have any size. With ``.raw``, a header ``.nhdr`` for
+            NRRD readers is also written. Other formats of `texrs.io.write` and `texrs.io.write_volume` need the whole
+            array in memory at the end.
         shape : int or sequence of int
-            Samples along each axis.
+            Number of samples along each axis.
         chunks : int or sequence of int, optional
             {chunks}
         origin : int or sequence of int
-            First sample, in the coordinates of the unbounded texture. Default: 0.
+            Position of the first sample, in the coordinates of the unbounded texture. Default: 0.
         map : str, optional
             {map}
         spacing : sequence of float, optional

@@ -21,9 +21,9 @@ def count_levels(grid: Grid) -> int:
 def halve_block(block: Array, axes: int, *, labelled: bool) -> Array:
     """Halve the resolution of a block: each sample becomes the mean of 2^A samples, where A is ``axes``.
 
-    The last samples of an odd side count twice. Integers of up to 32 bits are rounded to the nearest, halves upwards.
-    Larger integers round halves to even. Classes are not averaged: the most frequent class is taken, and the smallest
-    if several are equally frequent.
+    If a side is odd, its last samples count twice. Integers of up to 32 bits are rounded to the nearest, halves
+    upwards. Larger integers round halves to even. Classes are not averaged: the most frequent class is taken, and the
+    smallest class if several are equally frequent.
 
     Examples
     --------

@@ -29,7 +29,7 @@ __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
 RECORD = "texrs"
 """Name of the attribute that records the work a store belongs to."""
 BEGINNING = 0.5
-"""Seconds to wait until a folder becomes a store, because another process may be creating it."""
+"""Maximum number of seconds to wait until a folder becomes a store, because another process may be creating it."""
 IMAGE = "image"
 """Name of a single map. It is stored at the root."""
 
@@ -324,7 +324,7 @@ class _Fill:
 
 @dataclass(frozen=True)
 class _Halve:
-    """Task that computes a chunk of a level from the previous level in each map."""
+    """Task that computes a chunk of a level from the previous level, in each map."""
 
     maps: dict[str, Channel]
     grid: Grid

@@ -31,9 +31,9 @@ Scheduler = Any
 Work = Callable[[int], Any]
 
 TRIES = 3
-"""Number of lost workers after which a task is given up."""
+"""Number of workers that a task may end before it is given up."""
 AHEAD = 2
-"""Tasks queued at each worker, including the running one, so that a worker need not wait for the next."""
+"""Number of tasks queued at each worker, including the running task, so that a worker need not wait for the next."""
 SHORT = 1.0
 """Target duration of a batch of tasks on a cluster, in seconds.
 
@@ -42,11 +42,11 @@ Short tasks are batched because each task costs the scheduler and its worker som
 MOST_AT_ONCE = 32
 """Maximum number of tasks of a batch."""
 GRACE = 5.0
-"""Seconds in which a worker that must end can remove half-written files."""
+"""Number of seconds in which a worker that must end can remove partial files."""
 
 
 class WorkerLost(TexrsError):
-    """A task ended its worker three times, most often because there is too little memory."""
+    """A task ended its worker three times. The usual reason is too little memory."""
 
 
 def run(
@@ -67,10 +67,10 @@ def run(
     numbers : sequence of int
         Numbers of the tasks.
     scheduler : None, int, str or distributed.Client
-        None is this process. An integer is a number of processes of this machine, which are started for this work. An
-        address or a client is a cluster.
+        Workers that run the tasks: None is this process. An integer is a number of processes of this machine, which
+        are started for this work. An address or a client is a cluster.
     threads_each : int, optional
-        Kernel threads of each worker. Default: processes share the cores, and a worker of a cluster uses its
+        Number of kernel threads of each worker. Default: processes share the cores, and a worker of a cluster uses its
         configured number of threads.
     spare : bool
         If True, a task that ends three workers does not stop the others. It yields a `WorkerLost` as its result.
@@ -128,7 +128,7 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
 
 
 def _heed(stop: Any) -> None:
-    """End this process after a stop message, or after the death of its parent, which could not end it."""
+    """End this process after a stop message, or after the death of the parent, which then cannot end it."""
     told = False
     with suppress(EOFError, OSError):
         stop.recv_bytes()
@@ -146,7 +146,7 @@ def _heed(stop: Any) -> None:
 
 
 def _leave(number: int, frame: Any) -> None:
-    """Abort the running task so that it removes half-written files. Later signals must not interrupt this."""
+    """Abort the running task so that it removes partial files. Later signals must not interrupt this."""
     global _LEAVING
     if not _BUSY:
         # No file is half-written. Do not raise, because the pool would print the exception.
@@ -219,7 +219,10 @@ class _Process:
 def _run_processes(
     work: Work, numbers: Sequence[int], count: int, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Run tasks in processes. Each runs a row of neighbours, then takes tasks from the end of the longest row."""
+    """Run tasks in processes.
+
+    Each runs a list of neighbouring tasks, then takes tasks from the end of the longest list.
+    """
     payload = pack(work)
     each = threads_each or max(1, (os.cpu_count() or 1) // count)
     # Give each process a row of neighbouring tasks, which share cached results.
@@ -356,7 +359,7 @@ def _run_cluster(
     queue = as_completed(loop=client.loop)
 
     def take(slot: int) -> list[int]:
-        """Take a batch from the row of a slot, or from the longest row if its own is empty."""
+        """Take a batch from the list of a slot, or from the longest list if its own list is empty."""
         row = rows[slot] or max(rows, key=len)
         return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
 

@@ -1,10 +1,10 @@
 """Blending: correct the colours of a composite so that its seams disappear.
 
 The method is section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using
-deformation", 2006. It follows Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. The paper's target
-differences, as printed, are those of the composite itself, so the composite would be the solution. Here the target
-differences come from the sources on both sides of a seam. If a seam follows the outline of an element, the step across
-it is correct and is kept. Otherwise a fog around the element would remain.
+deformation", 2006. It follows Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. The paper
+uses, as printed, the differences of the composite itself as the target, so the composite would be the solution. Here the
+target differences come from the sources on both sides of a seam. If a seam follows the outline of an element, the step
+across it is correct and is kept. Otherwise a fog around the element would remain.
 
 The correction depends only on the source map and on one map of the exemplar. It therefore works for each map of a
 material (colours, heights, normals) in any dtype.
@@ -47,10 +47,10 @@ from texrs.source_map import RenderOptions, SourceMap
 __all__ = ["SCREENING", "Visibility", "apply", "blend", "measure_visibility"]
 
 SCREENING = 0.15
-"""Default weight of the values.
+"""Default weight of the original values.
 
-Rare colours drift by two grey levels with this weight, and by three or more with smaller ones. Seams are 1 to 2 % more
-visible than with 0.1.
+With this weight, rare colours drift by two grey levels. They drift by three or more with smaller weights. Seams are 1
+to 2 % more visible than with a weight of 0.1.
 """
 
 
@@ -78,10 +78,10 @@ def blend(
     over neighbours p, q, in each channel, and I is ``source.render(exemplars)``. If the source continues from p to q,
     the target difference g is the difference of I.
 
-    Across a seam, g is the mean of the differences that the sources of p and q have: ``I(S(p) + J(p) e) - I(S(p))``
-    and ``I(S(q)) - I(S(q) - J(q) e)``. Only differences inside the exemplars count; g is 0 if neither is inside. A
-    seam follows the outline of an element if one of the sources itself shows the step across it, and then g is the
-    actual step. Outlines are detected in all channels together.
+    Across a seam, g is the mean of the differences in the sources of p and q: ``I(S(p) + J(p) e) - I(S(p))`` and
+    ``I(S(q)) - I(S(q) - J(q) e)``. Only differences inside the exemplars count; g is 0 if neither is inside. If one of
+    the sources contains the step itself, the seam follows the outline of an element, and g is the actual step.
+    Outlines are detected in all channels together.
 
     Parameters
     ----------
@@ -93,20 +93,22 @@ def blend(
         Axes along which the image is periodic. Along other axes, the outermost pixels keep their values, unless
         ``within`` selects the corrected pixels.
     screening : float
-        Weight of the values relative to the differences, at least 0. The paper uses 0. Colours drift over about
-        ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer. Default: 0.15.
+        Weight of the original values relative to the differences, at least 0. The paper uses 0. Colours drift over
+        about ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer. Default: 0.15.
     band : int, optional
-        Maximum distance of corrected pixels from a seam, in pixels, at least 1. All others keep their values. Default:
-        unlimited.
+        Maximum distance of corrected pixels from a seam, in pixels, at least 1. All other pixels keep their values.
+        Default: unlimited.
     within : (H, W) bool or integers, path or Mask, optional
-        Mask of the pixels to correct, such as the filled hole of an image. All others keep their values. Default: all.
+        Mask of the pixels to correct, such as the filled hole of an image. All other pixels keep their values.
+        Default: all.
     known : (h, w) bool or integers, or a sequence of one per exemplar, optional
         Masks of the exemplar pixels that may be used beyond a seam. Default: all.
     across : bool
-        If True, also correct seams between two exemplars. `texrs.design` uses False, because the colours of flowers
-        and moss would bleed into each other. Default: True.
+        If True, also correct seams between two exemplars. `texrs.design` uses False, because the colours of two
+        exemplars, such as flowers and moss, would bleed into each other. Default: True.
     parts : (H, W) integers, optional
-        Part of each pixel, such as floor or wall. Nothing is corrected where two parts meet. Default: one part.
+        Index of the part of each pixel, such as floor or wall. Seams between two parts are not corrected. Default: one
+        part.
     outlines : bool
         If True, keep the step across a seam that follows the outline of an element. If False, smooth all steps, as the
         paper does. Default: True.
@@ -115,8 +117,8 @@ def blend(
     antialias : bool
         If True, smooth the exemplar where it is reduced, as in `SourceMap.render`. Default: False.
     map_type, green
-        Type of the map and direction of y, as in `SourceMap.render`. For normals, the slopes are corrected, then
-        normals get unit length again. Only the channels that store normals are corrected.
+        Type of the map and direction of y, as in `SourceMap.render`. For normals, the slopes are corrected, and the
+        normals are then normalised. Only the channels that store normals are corrected.
     progress : callable or True, optional
         Function called as ``progress("blend", share)`` with the completed share. If it raises an exception, the work
         stops. True shows a bar.
@@ -134,14 +136,14 @@ def blend(
 
     Notes
     -----
-    Some values cannot be interpolated, so they are returned as `SourceMap.render` gives them. These are the last of
-    two or of four channels (transparency), bool and signed integers, and all values with ``interpolation="nearest"``
+    Some values cannot be interpolated, so they are returned as `SourceMap.render` gives them. These are transparency
+    (the last of two or of four channels), bool and signed integers, and all values with ``interpolation="nearest"``
     (labels).
 
     Images of more than 2^22 pixels are solved in overlapping strips of rows, if the screening makes corrections decay
-    within a strip. This holds up to a width of 2^15 pixels at 0.01, and of 2^13 at 0.001. It then needs at most 0.4 GB
-    in addition to the result. Other images, such as all without screening, are solved whole, one channel after
-    another. They need 8 bytes per pixel, and 24 for normals.
+    within a strip. This is the case up to a width of 2^15 pixels at a screening of 0.01, and of 2^13 at 0.001. Strips
+    need at most 0.4 GB in addition to the result. Other images, such as all images without screening, are solved
+    whole, one channel after another. They need 8 bytes per pixel, and 24 for normals.
 
     References
     ----------
@@ -217,7 +219,7 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Render a map through a source map, with the same finish as the image of the verb that created the source map.
+    """Render a map through a source map, with the same options as the image of the verb that created the source map.
 
     Specify the type of the map here. `texrs.apply` infers it from the name of a file.
 
@@ -232,7 +234,7 @@ def apply(
     green : {"up", "down"}
         Direction of the y axis of normals and vectors: up (OpenGL) or down (DirectX). Default: "up".
     finish : RenderOptions, optional
-        Finish. Default: the finish of the source map.
+        Render options. Default: the options of the source map.
     progress : callable or True, optional
         Function called as ``progress("blend", share)`` while seams are corrected. If it raises an exception, the work
         stops. True shows a bar.
@@ -275,7 +277,7 @@ def _look_up(
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
-    """Look maps up and correct their seams. The finish decides about even light, or light that is reapplied."""
+    """Render maps and correct their seams. The finish specifies whether the light is removed, or applied again."""
     if map_type == "label":
         return source.render(several, interpolation="nearest")
     if how is not None and how.flatten_lighting and map_type == "colour":
@@ -299,7 +301,7 @@ def _even_out(
     green: Literal["up", "down"],
     progress: Progress | None,
 ) -> Array:
-    """Look a map up, and correct its seams if the finish requests it."""
+    """Render a map, and correct its seams if the finish requests it."""
     if how is None or how.screening is None:
         rest: dict[str, Any] = {} if how is None else {"interpolation": how.interpolation, "antialias": how.antialias}
         return source.render(exemplars, map_type=map_type, green=green, **rest)
@@ -323,7 +325,7 @@ def _even_out(
 
 
 def _follow_light(source: SourceMap, exemplar: Array, how: RenderOptions, progress: Progress | None) -> Array:
-    """Look a map up in even light, then apply the light of the new place to new pixels."""
+    """Render a map without its uneven light, then apply the light of the new place to new pixels."""
     assert how.light is not None
     assert how.within is not None
     pixels = as_image(exemplar)
@@ -358,7 +360,7 @@ def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[fl
 
 
 def as_known(value: object, shapes: Sequence[tuple[int, ...]]) -> list[Floats]:
-    """Check the masks of the exemplars, and return them as 0 or 1."""
+    """Check the masks of the exemplars, and return them with the values 0 and 1."""
     several = as_list(value)
     if len(several) != len(shapes):
         raise InvalidInput(f"known: must be a mask for each of {len(shapes)} exemplars, got {len(several)}")

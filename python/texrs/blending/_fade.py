@@ -1,4 +1,4 @@
-"""Fade of a filling into the image around it."""
+"""Fade a filling into the image around it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from texrs._typing import Array
 def fade_in(made: Array, own: object, weight: NDArray[np.uint8], map_type: str) -> Array:
     """Mix a rendered map with the exemplar at the same place, in the band where the weight is between 0 and 255.
 
-    Labels, bools and signed integers cannot be interpolated, so the larger weight decides. Normals keep unit length.
+    Labels, bools and signed integers cannot be interpolated, so the value with the larger weight is used. Normals keep
+    unit length.
     """
     at = np.nonzero((weight > 0) & (weight < 255))
     result = made.copy()

@@ -1,4 +1,4 @@
-"""Seams of a source map, and the values that the sources show on both sides of them."""
+"""Seams of a source map, and the values of the sources on both sides of each seam."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ BELL = np.exp(-0.5 * np.square(np.arange(REACH + 1) / ALONG))
 WINDOW = np.round(BELL / (2 * BELL.sum() - 1), 15).tolist()
 """Weights of the window by distance. They sum to 1 over both directions."""
 OUTLINE = (0.35, 0.6)
-"""Shares of the step across a seam that one of its sources shows itself.
+"""Minimum shares of the step across a seam that are also present in one of its sources.
 
-Above the first it may be an outline of an element, above the second it certainly is. Where noise is cut, the share is
-up to 0.25.
+Above the first share, the seam may be an outline of an element; above the second, it certainly is. Where noise is cut,
+the share is up to 0.25.
 """
 
 
@@ -39,7 +39,7 @@ class Look:
     across: bool
     """If True, there are seams where two exemplars meet."""
     parts: NDArray[np.uint16] | None
-    """Part of each pixel, (H, W). Borders of parts are not seams."""
+    """Index of the part of each pixel, (H, W). Borders of parts are not seams."""
     outlines: bool
     """If True, outlines of elements keep their step."""
     interpolation: Interpolation
@@ -102,7 +102,7 @@ class Seam:
     at: tuple[Array, ...]
     after: tuple[Array, ...]
     lack: Floats
-    """Target differences from ``at`` to ``after`` minus the actual ones, (n, C), for values in [0, 1]."""
+    """Target differences from ``at`` to ``after`` minus the actual differences, (n, C), for values in [0, 1]."""
 
 
 def measure_outlines(
@@ -110,7 +110,7 @@ def measure_outlines(
 ) -> Floats:
     """Return how certainly each pair of neighbours is on an outline of an element that covers others, 0 to 1.
 
-    On an outline, one of the sources shows most of the step itself. The steps are summed along the seam, because in
+    On an outline, one of the sources contains most of the step itself. The steps are summed along the seam, because in
     noise a single pair may agree by chance.
     """
     points = np.stack(at, axis=1, dtype=np.int64)
@@ -148,7 +148,7 @@ def wrap_rows(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
 
 
 def take_rows(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
-    """Take some rows of a source map."""
+    """Return some rows of a source map."""
     frame = source.jacobian_array()
     frame = frame if frame is None or frame.ndim == 3 else frame[rows]
     return SourceMap(source.coordinates[rows], source.exemplar[rows], source.label[rows], frame, source.shapes)

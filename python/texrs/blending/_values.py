@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.source_map._vectors import stores_z
 
 STRIP = 2**22
-"""Maximum number of pixels that are solved at once. Corrections that reach far take up to four times as many."""
+"""Maximum number of pixels that are solved at once, or four times as many if corrections reach far."""
 STEEPEST = 4.0
 """Maximum slope, 76 degrees. Steeper slopes are clipped."""
 FLATTEST = 0.2

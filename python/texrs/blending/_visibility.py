@@ -26,7 +26,7 @@ class Visibility:
     Attributes
     ----------
     edges : int
-        Number of measured pairs of neighbours that a seam separates.
+        Number of measured pairs of neighbours that are separated by a seam.
     mean : float
         Mean difference across seams, divided by the exemplar's mean difference.
     outliers : float
@@ -52,20 +52,19 @@ def measure_visibility(
     exemplars : array, or a sequence of one per exemplar
         Exemplars that the image was synthesised from.
     image : (H, W) or (H, W, C) array
-        Image, corrected or not. Its first three channels are measured, or the first one of two.
+        Image, corrected or not. Its first three channels are measured, or the first channel of two.
     wrap : bool or (rows, columns)
         Axes along which the image is periodic.
 
     Returns
     -------
     Visibility
-        Differences across the seams. ``mean`` and ``outliers`` are 0 without a seam, or if the exemplar is
-        constant.
+        Differences across the seams. ``mean`` and ``outliers`` are 0 without a seam, or if the exemplar is constant.
 
     Notes
     -----
-    For an image of more than 2^22 pixels, only bands of rows spread over it are measured. For an exemplar of more than
-    2^20 pixels, only rows spread over it are.
+    If an image has more than 2^22 pixels, only bands of rows spread over it are measured. If an exemplar has more than
+    2^20 pixels, only rows spread over it are measured.
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""Unbounded designs from corner tiles: any window is a look-up.
+"""Unbounded designs from corner tiles, whose windows are computed by look-up.
 
 The method is A. Lagae and P. Dutre, "An alternative for Wang tiles: colored edges versus colored corners", ACM
 Transactions on Graphics 25(4), 2006. Each corner of a lattice has one of three colours, chosen by a hash. The four
 corners of a cell select one of 81 tiles. Neighbouring tiles therefore agree along their edges and at their corners,
-and nothing repeats periodically. A window takes only the time of a copy, wherever it is.
+and the texture is not periodic. A window takes only the time of a copy, at any position.
 
 First, several tileable images are designed (`texrs.design_variants`). Then a strip for each pair of corners is cut
 from them. Finally the inside of each tile is cut into its ring of strips, once along all edges
@@ -57,7 +57,7 @@ LARGER = "texrs.CornerTiles.to_zarr and to_dask give it in parts"
 """Remedy in the error for windows that are too large for one array."""
 IMAGE = "image"
 KEEP = 4.0
-"""Extra cost of a cut deep inside an element, relative to other cuts."""
+"""Extra cost of a cut deep inside an element, relative to the cost of other cuts."""
 DEPTH = 3.0
 
 
@@ -74,7 +74,8 @@ class CornerTiles(InParts):
     seed : int
         Seed of the tiles and of their arrangement, 0 to 2^64 - 1.
     variants : int
-        Number of tileable images that tiles are cut from, 1 to 64. Each is twice as large as a tile. Default: 4.
+        Number of tileable images that tiles are cut from, 1 to 64. Each is twice as large as a tile along each axis.
+        Default: 4.
     progress : callable or True, optional
         Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
     **options
@@ -193,19 +194,19 @@ class CornerTiles(InParts):
         return IMAGE if self._like is None else self._like.base_name
 
     def index(self, origin: int | Sequence[int], size: int | Sequence[int]) -> NDArray[np.uint8]:
-        """Return the tile in each cell of the lattice.
+        """Return the index of the tile in each cell of the lattice.
 
         Parameters
         ----------
         origin : int or (int, int)
-            First cell. Cell (i, j) begins at pixel (i tile_size, j tile_size).
+            Row and column of the first cell. Cell (i, j) begins at pixel (i tile_size, j tile_size).
         size : int or (rows, columns)
             Number of cells, as rows and columns.
 
         Returns
         -------
         (rows, columns) uint8
-            Position of the tile in the atlas: 9 times its row plus its column.
+            Index of the tile in the atlas: 9 times its row plus its column.
 
         Raises
         ------
@@ -251,7 +252,7 @@ class CornerTiles(InParts):
         Returns
         -------
         Synthesis
-            Window, with all maps of a material, and its source map. The labels are those of the atlas.
+            Window, with all maps of a material, and its source map. Its labels are those of the atlas.
 
             Stages:
 
@@ -327,7 +328,7 @@ class CornerTiles(InParts):
         folder : path_like
             Output folder. It is created if it is missing, and files of the same names are replaced.
         cells : int or (rows, columns)
-            Size of the index texture in cells. A shader wraps around at its ends. Default: 256.
+            Size of the index texture in cells. A shader repeats it beyond its ends. Default: 256.
 
         Returns
         -------

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 __all__ = ["COLOURS", "TILES", "TORUS", "draw_colours", "number_tiles"]
 
 COLOURS = 3
-"""Number of corner colours. With two, the repetition is visible."""
+"""Number of corner colours. With two colours, the repetition is visible."""
 TILES = COLOURS**4
 _RING = np.array([0, 0, 1, 0, 2, 1, 1, 2, 2])
 """Ring that contains each ordered pair of colours once."""
@@ -17,8 +17,8 @@ _STEPS = np.array([sum(range(i)) for i in range(9)])
 TORUS: NDArray[np.intp] = _RING[(np.arange(9) + _STEPS[:, np.newaxis]) % 9]
 """Colours of 9 x 9 corners on a torus with each tile once.
 
-Each row is the ring, shifted against the row above by a different number of steps, so that no combination of two pairs
-occurs twice.
+Each row is the ring, shifted against the previous row by a different number of steps, so that each combination of two
+pairs occurs once.
 """
 
 
@@ -39,6 +39,6 @@ def _mix(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def number_tiles(corners: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the number of the tile between each four corners; the result has one row and column fewer."""
+    """Return the index of the tile between each four corners; the result has one row and column fewer."""
     found = corners[:-1, :-1] * 27 + corners[:-1, 1:] * 9 + corners[1:, :-1] * 3 + corners[1:, 1:]
     return np.asarray(found, np.intp)

@@ -17,9 +17,9 @@ from texrs.kernels.seam import cut, cut_strip
 __all__ = ["cut_tiles"]
 
 STRIPS, INSIDES = 24, 6
-"""Number of candidates for each strip and each inside. The one with the cheapest cut is used.
+"""Number of candidates for each strip and for each inside. The candidate with the cheapest cut is used.
 
-Strips get more because they are seen nine times as often.
+Strips have more candidates because each strip is visible nine times as often as an inside.
 """
 BORDER = 3 / 16
 """Half the width of a strip, as a share of a tile's side.
@@ -28,7 +28,7 @@ The content of corners and strips recurs in many tiles, so wider strips repeat m
 for cuts.
 """
 EDGES = 0.2
-"""Approximate share of the edges in the work. The progress uses it."""
+"""Approximate share of the work for the edges, which is used to report progress."""
 
 
 def cut_tiles(
@@ -64,7 +64,7 @@ def cut_tiles(
 
 
 def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, corners: tuple[Place, Place]) -> Places:
-    """Cut the strip between two corners, ``side`` long and 2 ``half`` wide; that of axis 1 runs across."""
+    """Cut the strip between two corners, ``side`` long and 2 ``half`` wide. The strip of axis 1 runs across."""
 
     def look(place: Place, along: int, length: int) -> Places:
         """Return the part of a strip that begins ``along`` pixels from a corner's centre, laid out across."""
@@ -97,7 +97,7 @@ def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, co
 
 
 def _fill(pictures: Pictures, fit: Fit, ring: Places, half: int) -> Places:
-    """Cut an inside into the ring of a tile. The outermost pixels stay those of the ring."""
+    """Cut an inside into the ring of a tile. The outermost pixels are always pixels of the ring."""
     shape = (ring.shape[0], ring.shape[1])
     band = np.ones(shape, bool)
     band[half:-half, half:-half] = False

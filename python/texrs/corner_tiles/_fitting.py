@@ -14,14 +14,17 @@ from texrs.kernels.patch_search import PatchIndex
 __all__ = ["Fit", "Pictures", "Place", "Places", "look_up"]
 
 APART = 32
-"""Divisor of a tile's side: the minimum distance of candidates for a piece, along at least one axis."""
+"""Divisor of a tile's side that gives the minimum distance of candidates for a piece, along at least one axis."""
 SPARE = 8
-"""Factor of extra candidates, because some are at positions that are taken already."""
+"""Factor for the number of candidates, because some are at positions that are already taken."""
 AGAIN = 8
-"""Divisor of a tile's side: closer to a taken position, a piece would show the same content again."""
+"""Divisor of a tile's side that gives the minimum distance from a taken position.
+
+Closer pieces would repeat its content.
+"""
 
 Place = tuple[int, int, int]
-"""Number of an image, and a row and a column in it."""
+"""Index of an image, and a row and a column in it."""
 Places = NDArray[np.int32]
 """Source position of each pixel: image, row, column; (..., 3)."""
 
@@ -95,11 +98,11 @@ class Fit:
         Parameters
         ----------
         known : Places
-            Piece. Positions without weight are ignored.
+            Source positions of the piece. Positions without weight are ignored.
         weight : (rows, columns) bool
-            Known part of the piece.
+            Mask of the known part of the piece.
         count : int
-            Number of positions.
+            Number of positions to return.
         ahead : (int, int)
             Offset of the piece from the first pixel of a tile.
 
@@ -117,7 +120,7 @@ class Fit:
         return ([place for place in places if not self._is_taken(place)] or places)[:count]
 
     def take(self, place: Place) -> None:
-        """Mark a position as taken, so that later pieces show other content."""
+        """Mark a position as taken, so that later pieces have other content."""
         self._taken.append(place)
 
     def _is_taken(self, place: Place) -> bool:

@@ -14,14 +14,14 @@ from texrs.exemplar.regularity import Lattice
 __all__ = ["Draw", "choose_side", "find_step"]
 
 SMALLER = 0.7
-"""Minimum share of the usual side for a side that is chosen so that a lattice closes on it."""
+"""Minimum side of a tile that contains whole periods, as a share of the usual side."""
 WHOLE = 0.01
 """Maximum deviation of the number of periods in a side from an integer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Equivalent positions in tileable images, which show the same part of a period."""
+    """Equivalent positions in tileable images, which are at the same point of a period."""
 
     shifts: NDArray[np.intp]
     """Lattice translations within an image, (n, 2). The image looks similar after each."""
@@ -39,7 +39,7 @@ class Draw:
     size: tuple[int, int]
     """Rows and columns of each image."""
     step: Step | None
-    """Equivalent positions to draw from. None draws from all."""
+    """Equivalent positions to choose from. None allows all positions."""
 
     def __call__(self, row: int = 0, column: int = 0, which: int | None = None) -> tuple[int, int, int]:
         """Draw an image, unless ``which`` is given, and a position for content at this offset from a tile's corner."""
@@ -52,7 +52,7 @@ class Draw:
 
 
 def choose_side(lattice: Lattice | None, usual: int) -> int:
-    """Return the side of a tile, a multiple of 4, that a lattice fits with the least change, or the usual one."""
+    """Return the side of a tile, a multiple of 4, that fits a lattice with the least change, or the usual side."""
     if lattice is None:
         return usual
     changes = []

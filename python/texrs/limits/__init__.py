@@ -1,10 +1,10 @@
 """Limit the pixels, voxels, bytes of memory and seconds of calls, in one place.
 
 Every verb compares its needs with these limits before it begins, and raises `texrs.errors.LimitExceeded` when its time
-is up. By default an array may have 2^28 pixels or voxels. Memory is limited by the machine, the container and the
-limits of the process (`ulimit -v`, control groups). Time is not limited.
+is up. By default, an array can have at most 2^28 pixels or voxels. Memory is limited by the machine, the container and
+the limits of the process (`ulimit -v`, control groups). Time is not limited.
 
-Limits are set in three ways. If several apply, the smallest counts:
+Limits are set in three ways. If several are set, the smallest applies:
 
 - `context` for a block of code, in this thread or asynchronous task;
 - `set` for the whole process;

@@ -1,4 +1,4 @@
-"""Limits in force: the smallest of the limits of the block, of the process and of the environment."""
+"""Limits in force: the smallest limit of the block, the process and the environment."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["MAX_PIXELS", "Limits", "check_time", "context", "current", "find", "
 MAX_PIXELS = 2**28
 """Default limit of the pixels or voxels of an array."""
 MOST_PIXELS = 2**32 - 1
-"""Maximum value of a limit of pixels, because points are counted by 32 bits."""
+"""Maximum value of a limit of pixels, because pixels are counted with 32 bits."""
 WORDS = {
     "pixels": "a number of pixels between 1 and 2^32 - 1",
     "voxels": "a number of voxels between 1 and 2^32 - 1",
@@ -38,9 +38,9 @@ class Limits:
     pixels, voxels : int
         Maximum number of pixels of an image, or of voxels of a volume, that is computed or read.
     memory : int, optional
-        Maximum bytes of the process. None if no limit is known.
+        Maximum number of bytes of the process. None if no limit is known.
     seconds : float, optional
-        Seconds that remain for a block, or maximum seconds of a call. None if there is no limit.
+        Number of seconds that remain for a block, or maximum number of seconds of a call. None if there is no limit.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """Limits from one place. None if a limit is not set there."""
+    """Limits that are set in one place. None for a limit that is not set there."""
 
     pixels: int | None = None
     voxels: int | None = None
@@ -89,11 +89,11 @@ def context(
         Maximum number of pixels of an image, or of voxels of a volume, that is computed or read. 1 to 2^32 - 1.
         Default: unchanged.
     memory : int or float, optional
-        Maximum bytes of the process. 8e9 is the same as 8000000000. The limits of the machine and its container still
-        apply. Default: unchanged.
+        Maximum number of bytes of the process. 8e9 is the same as 8000000000. The limits of the machine and its
+        container still apply. Default: unchanged.
     seconds : float, optional
-        Maximum seconds of the whole block. Verbs stop at their next progress report, at most a fraction of a second
-        later. Default: unchanged.
+        Maximum number of seconds of the whole block. Verbs stop at their next progress report, at most a fraction of a
+        second later. Default: unchanged.
 
     Yields
     ------
@@ -103,7 +103,7 @@ def context(
     Raises
     ------
     InvalidInput
-        If a limit is not such a number.
+        If a limit is not a number in its range.
 
     Notes
     -----
@@ -144,12 +144,12 @@ def set(
     pixels, voxels, memory : optional
         As in `context`.
     seconds : float, optional
-        Maximum seconds of each call. Default: no limit.
+        Maximum number of seconds of each call. Default: no limit.
 
     Raises
     ------
     InvalidInput
-        If a limit is not such a number.
+        If a limit is not a number in its range.
 
     Examples
     --------
@@ -175,7 +175,7 @@ def current() -> Limits:
     Raises
     ------
     InvalidInput
-        If an environment variable is not such a number.
+        If an environment variable does not contain a number in its range.
 
     Examples
     --------

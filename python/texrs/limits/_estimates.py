@@ -33,7 +33,7 @@ class Cost:
     fixed: float = 3e6
     """Bytes that do not depend on the sizes."""
     several: float = 0
-    """Bytes per pixel of the result for each example, if there are several."""
+    """Bytes per pixel of the result for each example, if there are several examples."""
     field: float = 0
     """Bytes per pixel of the result if a field varies."""
 
@@ -46,7 +46,7 @@ class Cost:
 COPIES = 4
 """Number of copies of the result's colours that are in memory at the same time."""
 BEYOND = 600
-"""Bytes per pixel of an extended texture. splice extends a texture to cover a larger result."""
+"""Bytes per pixel of an extended texture. `splice` extends a texture to cover a larger result."""
 COSTS: dict[str, dict[str | None, Cost]] = {
     "design": {None: Cost(1000, 680, 73, several=55)},
     "splice": {None: Cost(0, 350, 100)},
@@ -62,7 +62,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "analyse": {None: Cost(480, 0, 0, fixed=14e6)},
     "CornerTiles": {None: Cost(1000, 680, 90)},
 }
-"""Costs by verb, and by the ``method`` or ``quality`` if they differ from the others."""
+"""Costs by verb, and by the ``method`` or ``quality`` if their costs differ."""
 
 
 def estimate_memory(
@@ -88,11 +88,11 @@ def estimate_memory(
         Size of the result. For CornerTiles, the size of its atlas of nine tiles a side. Default: the size of the first
         example.
     dtype : dtype
-        Dtype of the example. Default: "uint8".
+        Value of ``method`` or ``quality``. Default: the default value of the verb.
     method : str, optional
         Value of ``method`` or ``quality``. Default: that of the verb.
     field : bool
-        If True, solid or synthesize is given a field that varies. Default: False.
+        If True, the call of solid or synthesize has a field that varies. Default: False.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Texture a mesh from a solid texture: each point of the surface shows the texture there, as a carved block does.
+"""Texture a mesh from a solid texture, so that it looks carved from a block of the material.
 
 Needs the extra: ``pip install texrs[mesh]``.
 """
@@ -36,7 +36,10 @@ def __dir__() -> list[str]:
 
 
 FINEST = 4.0
-"""Default number of exemplars along the longest side of a mesh. It is lower if the atlas cannot show the detail."""
+"""Default number of exemplars along the longest side of a mesh.
+
+The number is lower if the atlas cannot show the detail.
+"""
 _BAND = 1 << 20
 _BLOCK = 256.0
 
@@ -50,7 +53,7 @@ class TexturedMesh:
     vertices : (N, 3) float64
         Positions of the vertices, as x, y, z.
     faces : (M, 3) int64
-        Three vertices of each face.
+        Indices of the three vertices of each face.
     maps : dict of str to array
         Sampled maps, in the exemplar's dtype: (N[, C]) at the vertices, or (size, size[, C]) over the atlas. Several
         texture sets have (sets, size, size[, C]). A texture of an array has one map, "image".
@@ -59,13 +62,13 @@ class TexturedMesh:
     roles : dict of str to Role
         Roles of the maps, if the texture is a material.
     relief : (size, size, 3) float32, optional
-        Normals over the atlas: x to the right, y up, z out of the surface. They are those of a material, or are
+        Normals over the atlas: x to the right, y up, z out of the surface. They are the normals of a material, or are
         computed from its heights. Several texture sets have (sets, size, size, 3).
     sets : tuple of str
         Names of the texture sets. There is one, unless UVs of materials or of parts overlap, or UVs are in several
         tiles.
     which : (M,) int64, optional
-        Texture set of each face. None if there is one set.
+        Index of the texture set of each face. None if there is one set.
 
     Examples
     --------
@@ -91,19 +94,19 @@ class TexturedMesh:
     def save(self, path: Path, *, depth: Literal[8, 16] | None = None) -> list[FilePath]:
         """Write the mesh with every map that its format can store.
 
-        A .glb or .gltf file gets colours, opacity, roughness, metalness, occlusion, emission and `relief`. An .obj
-        file gets the same by its .mtl file. Names of objects and materials are kept, and so are normals. A mesh from
-        an .obj file keeps all lines in their order in .obj, unless an atlas was computed for it. Colours of vertices
-        are linear 16-bit values in .glb, and sRGB in .obj and .ply. Other maps become attributes of their
-        names (_HEIGHT) in .glb. `relief` needs an atlas.
+        A .glb or .gltf file contains colours, opacity, roughness, metalness, occlusion, emission and `relief`. An .obj
+        file refers to the same maps in its .mtl file. Names of objects and materials, and normals, are kept. If the
+        mesh comes from an .obj file and no atlas was computed for it, the .obj file keeps all lines in their order.
+        Colours of vertices are linear 16-bit values in .glb, and sRGB in .obj and .ply. Other maps become attributes
+        with their names in .glb (such as _HEIGHT). `relief` needs an atlas.
 
         Parameters
         ----------
         path : path_like
-            Name of the file: .glb, .gltf or .obj. With colours of vertices, also .ply. All files get their names after
-            all are written.
+            Path of the file: .glb, .gltf or .obj. With colours of vertices, also .ply. All files get their final names
+            after all are written.
         depth : {8, 16}, optional
-            Bits of images. Default: 8 if all maps have 8 bits, else 16.
+            Number of bits of images. Default: 8 if all maps have 8 bits, else 16.
 
         Returns
         -------

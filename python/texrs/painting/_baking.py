@@ -1,4 +1,4 @@
-"""Bake an atlas: find the point of the surface that each texel shows, compute normals from heights, and fill gaps."""
+"""Bake an atlas: find the point of the surface at each texel, compute normals from heights, and fill gaps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from texrs.painting._surface import Floats64
 __all__ = ["bake_points", "bake_values", "fill_between", "lean"]
 
 OFTEN = 256
-"""Number of triangles between two checks whether the call was cancelled."""
+"""Number of triangles between two checks for cancellation."""
 STEEPNESS = 0.4
 """Root mean square slope of normals that are computed from heights, because the unit of heights is unknown."""
 
@@ -20,7 +20,7 @@ STEEPNESS = 0.4
 def bake_points(
     vertices: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
 ) -> tuple[Floats64, NDArray[np.bool_]]:
-    """Return the point of the surface that each texel shows, (side, side, 3), and a mask of texels that show one.
+    """Return the point of the surface at each texel, (side, side, 3), and a mask of texels that have such a point.
 
     A texel next to a triangle gets a point in the plane of the nearest triangle, up to `padding` texels away.
     """

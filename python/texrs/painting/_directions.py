@@ -1,4 +1,4 @@
-"""Directions on a surface as a frame field of space: along or around an axis, by curvature, or by painted strokes.
+"""Directions on a surface as a frame field in space: along or around an axis, by curvature, or by painted strokes.
 
 The surface is sampled at points whose distance is about the width of a cell of the field. Each point gets a direction
 in the surface and a weight. A point of weight 0 repeatedly takes the mean of its neighbours. The curvature is that of
@@ -39,7 +39,7 @@ SMOOTHED = 6
 FINEST = 64
 """Maximum number of parts of a triangle's side."""
 DIGITS = 6
-"""Digits of directions. Later digits depend on the processor."""
+"""Number of decimal digits of directions. Later digits depend on the processor."""
 
 
 def field_on_surface(
@@ -58,7 +58,7 @@ def field_on_surface(
         the strokes themselves. Each stroke is a list of at least two points (x, y, z), in units of the mesh.
         Directions between strokes are interpolated.
     scale : float
-        Number of voxels in a unit of the mesh, as for `texture_mesh`.
+        Number of voxels per unit of the mesh, as for `texture_mesh`.
     along : {"x", "y", "z"}
         Axis of the exemplar that follows the directions: x, y or z. The z axis points out of the surface, or the y
         axis if ``along`` is "z".
@@ -176,7 +176,7 @@ def _shorten(arrows: Floats64) -> Floats64:
 def _bend(
     points: Floats64, normals: Floats64, near: tuple[NDArray[np.intp], Floats64], *, least: bool
 ) -> tuple[Floats64, Floats64]:
-    """Return the lines of greatest or least curvature of a surface, and the normals."""
+    """Return the directions of greatest or least curvature of a surface, without sign, and the normals."""
     index, weight = near
     # The normal curvature towards a neighbour follows from its distance and its height over the tangent plane.
     step = points[index] - points[:, np.newaxis]
@@ -221,7 +221,7 @@ def _make_axes(normals: Floats64) -> tuple[Floats64, Floats64]:
 
 
 def _agree(points: Floats64, near: tuple[NDArray[np.intp], Floats64], lines: Floats64, normals: Floats64) -> Floats64:
-    """Turn lines into vectors that agree along a spanning tree of the most parallel neighbours."""
+    """Choose the signs of directions so that vectors agree along a spanning tree of the most parallel neighbours."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import minimum_spanning_tree
 

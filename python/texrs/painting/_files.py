@@ -32,7 +32,7 @@ __all__ = ["SUFFIXES", "check_suffix", "write_mesh"]
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 ROUGH = 0.8
-"""Roughness of a material that has only colours."""
+"""Roughness of a material that has only a map of colours."""
 
 
 def check_suffix(path: Path, *, baked: bool) -> str:
@@ -221,7 +221,10 @@ def _show(maps: Mapping[str, Map]) -> NDArray[np.uint8]:
 def _spell_mtl(
     target: FilePath, prefix: str, pictures: Mapping[str, Array], height: Map | None, bits: int
 ) -> tuple[dict[FilePath, bytes], list[str]]:
-    """Return images, and the lines of a material that names them. Maps that OBJ lacks have their usual keywords."""
+    """Return images, and the lines of a material that refers to them.
+
+    Maps that OBJ does not define have their usual keywords.
+    """
     parts: dict[str, tuple[str, Array]] = {}
     for name, picture in pictures.items():
         if name == "basecolor":

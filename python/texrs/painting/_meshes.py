@@ -18,7 +18,7 @@ CREASE = 0.5
 def unwrap(
     vertices: Floats64, faces: NDArray[np.int64], side: int, padding: int
 ) -> tuple[Floats64, NDArray[np.int64], Floats64, NDArray[np.int64]]:
-    """Lay out a surface in charts, and return it with the number that each vertex had.
+    """Lay out a surface in charts, and return it with the original index of each vertex.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def shade(surface: Surface) -> Floats64:
 
 
 def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
-    """Return the outward normal of each vertex: the mean of the faces there, except those beyond a sharp edge.
+    """Vertices at the same position are treated as one vertex, so the surface stays smooth where the atlas is cut.
 
     Vertices at the same position count as one, so the surface stays smooth where the atlas is cut.
     """

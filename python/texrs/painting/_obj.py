@@ -19,7 +19,7 @@ from texrs.painting._surface import MESH, PAINTED, Floats64, Surface
 __all__ = ["paint_text", "read_obj", "spell_obj"]
 
 KNOWN = {"v", "vt", "vn", "f", "o", "g", "s", "usemtl", "mtllib", "mg"}
-"""Keywords whose lines are read, or copied unchanged."""
+"""Keywords of lines that are read, or copied unchanged."""
 
 
 def read_obj(name: str, text: str) -> Surface:
@@ -69,7 +69,7 @@ def read_obj(name: str, text: str) -> Surface:
 
 
 def _read_corner(end: str, rows: Mapping[str, Sequence[object]]) -> tuple[int, int, int]:
-    """Return the positions of a corner in the lists of vertices, UVs and normals; -1 for none."""
+    """Return the indices of a corner in the lists of vertices, UVs and normals; -1 if it has none."""
     found = []
     for key, index in zip(("v", "vt", "vn"), [*end.split("/"), "", ""][:3], strict=True):
         place = int(index or 0)

@@ -20,7 +20,7 @@ from texrs.painting._surface import MESH, PAINTED, Floats64, Surface
 __all__ = ["read_mesh"]
 
 PLACES = {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
-"""Properties of a vertex in a PLY file that are used."""
+"""Properties of a vertex in a PLY file that are used. Others are reported."""
 
 
 def read_mesh(mesh: Any) -> Surface:

@@ -3,8 +3,8 @@
 The normals of a volume specify the slopes of its relief along columns and rows. The frames of the texture turn these
 into slopes g in space. The part of g in the surface tilts the surface's normal n to n - (g - (g n) n). This is the
 normal of the surface after it is moved out by a height with the gradient g (J. F. Blinn, "Simulation of wrinkled
-surfaces", SIGGRAPH 1978). Viewers need it in the frame of the atlas (along its columns, up its rows, and out), which
-they interpolate between vertices.
+surfaces", SIGGRAPH 1978). Viewers need this normal in the frame of the atlas (along its columns, up its rows, and
+out), which they interpolate between vertices.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Texture sets: decide by the UVs of a mesh which faces share an atlas."""
+"""Texture sets: choose by the UVs of a mesh which faces share an atlas."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from texrs.painting._surface import PAINTED, Floats64, Surface
 __all__ = ["UnwrappedMesh", "lay_flat"]
 
 OFTEN = 256
-"""Number of triangles between two checks whether the call was cancelled."""
+"""Number of triangles between two checks for cancellation."""
 COARSE = 512
-"""Side of the atlas that is searched for overlaps."""
+"""Side in texels of the atlas that is searched for overlaps."""
 EDGE = 1e-6
-"""Largest distance of a UV beyond its tile that counts as a rounding error."""
+"""Maximum distance of a UV beyond its tile that counts as a rounding error."""
 SHARED = 0.02
 """Minimum overlap, as a fraction of the smaller part's texels. Touching edges share a few texels."""
 MOST = 64
@@ -38,7 +38,7 @@ class UnwrappedMesh(NamedTuple):
     names : tuple of str
         Names of the texture sets.
     which : (M,) int64
-        Texture set of each face.
+        Index of the texture set of each face.
     tile : (M, 2) float64
         Lower left corner of each face's tile.
 
@@ -86,7 +86,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Unwra
 
 
 def _unwrap_part(surface: Surface, bare: NDArray[np.bool_], side: int, padding: int) -> Surface:
-    """Return a mesh whose faces without UVs got UVs. They have their own vertices, which follow all others."""
+    """Return a mesh whose faces without UVs are unwrapped. They have their own vertices, which follow all others."""
     assert surface.uv is not None
     used, local = np.unique(surface.faces[bare], return_inverse=True)
     vertices, faces, uv, kept = unwrap(surface.vertices[used], local.reshape(-1, 3), side, padding)

@@ -22,19 +22,20 @@ class Surface(NamedTuple):
     vertices : (N, 3) float64
         Vertices, as x, y, z.
     faces : (M, 3) int64
-        Three vertices each.
+        Indices of the three vertices of each face.
     uv : (N, 2) float64, optional
         Position of each vertex in an atlas, from the lower left; NaN if the file has none.
     normals : (N, 3) float64, optional
         Normals from a file; NaN for vertices without one.
     part : (M,) int64
-        Part of each face. A part is a mesh of a scene, or the faces of an object that have the same material.
+        Index of the part of each face. A part is a mesh of a scene, or the faces of an object that have the same
+        material.
     materials, objects : tuple of str
         Names of the material and of the object of each part.
     text : str, optional
         Text of the OBJ file.
     origin : (N,) int64, optional
-        Number of each vertex in the OBJ file.
+        Index of each vertex in the OBJ file.
     name : str
         Name of the file, for notices.
 

@@ -36,11 +36,11 @@ class Augmented(NamedTuple):
     mask : (H, W) or (H, W, C) array, or None
         New labels, copied from the nearest pixels, so that no other labels occur.
     boxes : (n, 4) float64, or None
-        Boxes that survive, (left, top, right, bottom) in pixels. See `follow_boxes`.
+        Boxes of objects that are still visible enough, (left, top, right, bottom) in pixels. See `follow_boxes`.
     which : (n,) int, or None
-        Index of the given box that each box follows from, starting at 0.
+        Index, from 0, of the given box that each box was derived from.
     source_map : SourceMap
-        Source of each pixel. Other aligned maps follow with ``source_map.render``.
+        Source of each pixel. Use ``source_map.render`` to transform other aligned maps.
     seed : int
         Seed of this result. The same seed gives the same result.
 
@@ -59,11 +59,11 @@ class Augmented(NamedTuple):
     mask: Array | None
     """New labels, copied from the nearest pixels, so that no other labels occur."""
     boxes: NDArray[np.float64] | None
-    """Boxes that survive. See `follow_boxes`."""
+    """Boxes of objects that are still visible enough. See `follow_boxes`."""
     which: NDArray[np.intp] | None
-    """Index of the given box that each box follows from."""
+    """Index, from 0, of the given box that each box was derived from."""
     source_map: SourceMap
-    """Source of each pixel. Other aligned maps follow with ``source_map.render``."""
+    """Source of each pixel. Use ``source_map.render`` to transform other aligned maps."""
     seed: int
     """Seed of this result. The same seed gives the same result."""
 
@@ -85,11 +85,11 @@ def find_things(image: Exemplar) -> ElementOptions:
 
 
 class TextureAugment:
-    """Rearrange an image from pieces of itself, joined along minimum cuts. Labels and boxes follow.
+    """Rearrange an image from pieces of itself, joined along minimum cuts, and move its labels and boxes with it.
 
     Use it for images of textures, such as surfaces, materials, tissue, fields, and defects on them. Distant parts of
-    an image become neighbours. Seams avoid visible places, and elements stay whole if possible (`texrs.design` with
-    ``motion="keep"``). Every pixel is a copy of a pixel of the image, without interpolation.
+    an image become neighbours. Seams avoid places where they would be visible, and elements stay whole if possible
+    (`texrs.design` with ``motion="keep"``). Every pixel is a copy of a pixel of the image, without interpolation.
 
     Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ.
     The same image and seed give the same result in any process and with any number of threads. The kernels release the
@@ -101,8 +101,8 @@ class TextureAugment:
     Parameters
     ----------
     min_visible : float
-        Minimum share of a box's area that must be visible in one piece for the box to survive, 0 to 1. See
-        `follow_boxes`. Default: 0.5.
+        Minimum share of a box's area that must be visible in one piece, 0 to 1. Boxes with a smaller share are
+        dropped. See `follow_boxes`. Default: 0.5.
 
     Raises
     ------
@@ -128,7 +128,7 @@ class TextureAugment:
         self.min_visible = as_float(min_visible, "min_visible", 0, 1)
 
     def __repr__(self) -> str:
-        """Return the options."""
+        """Return a text with the options."""
         return f"TextureAugment(min_visible={self.min_visible})"
 
     def __call__(
@@ -147,7 +147,8 @@ class TextureAugment:
         mask : (H, W) or (H, W, C) array, optional
             Labels of the pixels, any dtype. Default: none.
         boxes : (n, 4 or more) array_like, optional
-            Boxes: left, top, right, bottom in pixels. Further columns stay with their box. Default: none.
+            Boxes: left, top, right, bottom in pixels. Further columns, such as a class, are copied with their box.
+            Default: none.
         seed : int, optional
             Seed of the sample, 0 to 2^64 - 1. The same seed gives the same result. Default: a new seed for each call,
             which is part of the result.

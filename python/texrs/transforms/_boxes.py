@@ -12,7 +12,7 @@ from texrs.source_map import SourceMap
 from texrs.source_map._pixels import label_pieces
 
 LOOSE = 0.5
-"""Maximum deviation of adjacent pixels of one piece from the step of their frame, in pixels."""
+"""Maximum deviation, in pixels, of the step between adjacent pixels of one piece from their Jacobian."""
 
 
 def follow_boxes(
@@ -20,10 +20,10 @@ def follow_boxes(
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the boxes around the visible parts of boxes after a source map is applied.
 
-    Adjacent pixels that are also adjacent in the exemplar belong to one piece. A piece that shows at least the share
-    ``min_visible`` of a box's area gets a box. This is the smallest box around the pixels of the piece that come from
-    inside the original. An object that is copied twice therefore has two boxes. A box of an object that is cut off is
-    smaller, and an object with too small a part has none. Boxes stay as tight or as loose as the given ones.
+    Adjacent pixels that are also adjacent in the exemplar belong to one piece. If a piece contains at least the share
+    ``min_visible`` of a box's area, it gets a box. This is the smallest box around the pixels of the piece that come
+    from inside the original. An object that is copied twice therefore has two boxes. The box of a truncated object is
+    smaller, and an object with too small a part has none. Boxes stay as tight or as loose as the given boxes.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def follow_boxes(
         Source map of an image from one exemplar.
     boxes : (n, 4 or more) array_like
         Boxes: left, top, right, bottom in pixels of the exemplar, measured from the outer edges. The whole image is 0,
-        0, columns, rows. Further columns, such as a class, stay with their box.
+        0, columns, rows. Further columns, such as a class, are copied with their box.
     min_visible : float
         Minimum share of the part of a box inside the image that must be visible in one piece, 0 to 1. Default: 0.5.
 
@@ -97,7 +97,7 @@ def follow_boxes(
 
 
 def _find_pieces(source: SourceMap) -> tuple[int, NDArray[np.int32]]:
-    """Return the number of pieces of the exemplar, and the index of the piece that each pixel shows."""
+    """Return the number of pieces of the exemplar, and the index of the piece that contains each pixel."""
     frames, joined = source.jacobians(), []
     for axis in range(2):
         step = np.diff(source.coordinates, axis=axis)

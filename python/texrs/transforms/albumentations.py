@@ -24,10 +24,10 @@ def __dir__() -> list[str]:
 class TextureAugment(DualTransform):  # type: ignore[misc]
     """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of albumentations.
 
-    The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` decides the samples. Each worker
+    The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` determines the samples. Each worker
     process has a copy of this generator in the same state. The seed also depends on the name of the process, which
-    its parent counts. Workers therefore differ, and so do the workers of the next epoch. An element that is copied several
-    times has several boxes, and their labels follow.
+    contains a counter of the parent. Workers therefore differ, and so do the workers of the next epoch. An element
+    that is copied several times has several boxes, each with the label of the original.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class TextureAugment(DualTransform):  # type: ignore[misc]
         return np.asarray(source.render(mask, interpolation="nearest"))
 
     def apply_to_bboxes(self, bboxes: Array, *, source: Any, **params: Any) -> Array:
-        """Return the boxes that survive, as shares of the image's sides as albumentations passes them."""
+        """Return the boxes that are still visible enough, as shares of the image's sides."""
         rows, columns = source.shape
         scale = np.concatenate([[columns, rows, columns, rows], np.ones(bboxes.shape[1] - 4)])
         boxes, _ = follow_boxes(source, bboxes * scale, self.min_visible)

@@ -26,7 +26,8 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
     """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of torchvision.
 
     Torch's generator draws the seeds. `torch.manual_seed`, and the seed that a loader gives each worker, therefore
-    decide the samples. A plain tensor ``"labels"`` of a dictionary, as long as the boxes, follows them.
+    determine the samples. If a sample is a dictionary with a plain tensor ``"labels"`` of the length of the boxes, the
+    labels follow the boxes.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         self._augment = Augment(min_visible)
 
     def make_params(self, flat_inputs: list[Any]) -> dict[str, Any]:
-        """Return the source map of this sample, and the boxes that survive with their indices."""
+        """Return the source map of this sample, and the boxes that are still visible enough with their indices."""
         pictures = [each for each in flat_inputs if not isinstance(each, tv_tensors.Mask | tv_tensors.BoundingBoxes)]
         if not pictures:
             raise InvalidInput("inputs: must contain an image, got none")
@@ -70,7 +71,7 @@ class TextureAugment(v2.Transform):  # type: ignore[misc]
         return tv_tensors.wrap(made, like=inpt) if isinstance(inpt, tv_tensors.TVTensor) else made
 
     def forward(self, *inputs: Any) -> Any:
-        """Transform all parts of a sample by one source map, and let labels follow the boxes."""
+        """Transform all parts of a sample by one source map, and select the labels of the remaining boxes."""
         given = inputs if len(inputs) > 1 else inputs[0]
         flat, spec = tree_flatten(given)
         wanted = self._needs_transform_list(flat)
@@ -90,7 +91,7 @@ def _to_array(picture: Any) -> Any:
 
 
 def _follow_labels(sample: Any, index: Any) -> Any:
-    """Return a sample with the labels of the boxes that survive."""
+    """Return a sample with the labels of the remaining boxes."""
     if index is None:
         return sample
     if isinstance(sample, dict):
