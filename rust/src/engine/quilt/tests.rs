@@ -50,7 +50,7 @@ fn options(fixed: Option<usize>) -> Options {
     }
 }
 
-/// Returns the windows of two by two patches.
+/// Returns the windows of a texture of two by two patches.
 fn windows() -> [Window; 4] {
     let span = |second: bool| Span {
         start: if second { 12 } else { 0 },

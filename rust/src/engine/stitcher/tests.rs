@@ -178,7 +178,7 @@ proptest! {
                 let at = (axis * 9 + p) * 2;
                 let there = point[axis] < 2;
                 let kept = if seed % 2 == 0 { 0.0 } else { costs[at].min(costs[at + 1]) };
-                // The index tells whether the first and the second point take the patch.
+                // The two indices state whether the first and the second point take the patch.
                 pairs.push(if there { [[kept, costs[at]], [costs[at + 1], 0.0]] } else { [[0.0; 2]; 2] });
             }
         }

@@ -130,8 +130,8 @@ impl<T: FftNum + Default> Images<T> {
         (self.size[1] / 2 + 1) * self.size[0]
     }
 
-    /// Computes the spectrum of an image whose first `rows` rows are given. `row(r, out)` writes a
-    /// row into zeros; the other rows are zero.
+    /// Computes the spectrum of an image whose first `rows` rows are given. `row(r, out)` writes row `r` into an array
+    /// of zeros. The other rows are zero.
     pub(crate) fn forward(
         &self,
         rows: usize,

@@ -112,8 +112,8 @@ pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
 }
 
 /// Encodes `pixels` (native byte order, `shape` = rows, columns, channels) without loss. The exception is HDR, which
-/// keeps eight bits of each pixel's largest channel. A combination that the format does not support is an error;
-/// nothing is converted.
+/// keeps eight bits of each pixel's largest channel. Samples are never converted. A combination that the format does
+/// not support is an error.
 pub fn encode(
     name: &str,
     format: Format,
@@ -313,7 +313,7 @@ impl Budget<'_> {
                 return Err(fail(self.name, message));
             }
         };
-        // Ignore unreadable metadata: the image itself may be fine.
+        // Ignore unreadable metadata, because the image itself may be fine.
         let orientation = decoder
             .orientation()
             .map_or(1, |orientation| orientation.to_exif());

@@ -20,9 +20,9 @@ pub(super) struct Front {
     unknown: Vec<u32>,
     /// First row, or column, of the window that is centred on each row, or column.
     centred: [Vec<usize>; 2],
-    /// Best hole of each block of the canvas, as (unknown pixels, hole). It has the fewest unknown
-    /// pixels in its window; ties go to the first hole in scan order. A step changes only a few
-    /// blocks, which are then searched again.
+    /// Best hole of each block of the canvas, as (unknown pixels, hole). It has the fewest unknown pixels in its
+    /// window. Ties go to the first hole in scan order. A step changes only a few blocks, which are then searched
+    /// again.
     best: Vec<(u32, usize)>,
 }
 

@@ -184,7 +184,7 @@ pub fn inpaint(
         }
         let matches = chooser.matches(&window, to, &result.patches, monitor)?;
         stitchers.resize_with(matches.len().max(stitchers.len()), Mutex::default);
-        // Lowest cost so far, as bits: the bits of non-negative floats have the same order as the
+        // Lowest cost so far, stored as bits, because the bits of non-negative floats have the same order as the
         // floats.
         let least = AtomicU64::new(f64::INFINITY.to_bits());
         let cuts = par::map(matches.len(), |i| {
@@ -197,7 +197,7 @@ pub fn inpaint(
             }
             Ok(cut)
         });
-        // Take the cheapest cut; ties go to the better match.
+        // Take the cheapest cut. Ties go to the better match.
         let mut best: Option<(f64, usize, Vec<bool>)> = None;
         for (i, cut) in cuts.into_iter().enumerate() {
             if let Some((value, taken)) = cut?

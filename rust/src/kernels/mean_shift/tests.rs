@@ -118,7 +118,7 @@ fn refuses_what_it_cannot_filter() {
         wrap: [false; 2],
     };
     let monitor = Monitor::default();
-    // Invalid images, then invalid options, then a cancelled monitor.
+    // Invalid images, then invalid options, then a cancelled monitor are errors.
     assert!(filter(&[0.0; 4], [2, 2, 2], &options, &monitor).is_err());
     assert!(filter(&[], [0, 2, 1], &options, &monitor).is_err());
     assert!(filter(&[f32::NAN; 4], [2, 2, 1], &options, &monitor).is_err());

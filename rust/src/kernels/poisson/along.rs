@@ -66,7 +66,7 @@ impl Inverse {
         }
     }
 
-    /// Solves the systems of all channels of a row. `fill` gets the old row and writes the right-hand side; the
+    /// Solves the systems of all channels of a row. `fill` gets the old row and writes the right-hand side. The
     /// solution then replaces the row.
     pub(super) fn apply(
         &self,

@@ -188,8 +188,8 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
         }
         out
     };
-    // Step 1: compute the pivots, which are the same for all channels. A singular system is pinned:
-    // its last value is 0.
+    // Step 1: compute the pivots, which are the same for all channels. A singular system is pinned by setting its last
+    // value to 0.
     lines.pivots.resize(rows, zero);
     let middle = diagonal(1.min(rows.saturating_sub(2)));
     let mut last = zero;
@@ -203,7 +203,7 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
             if row + 1 == rows {
                 last[l] = T::default();
             } else if cyclic {
-                last[l] = T::of(0.5); // no corner where the chain is cut
+                last[l] = T::of(0.5); // Pinning cuts the cycle, so the diagonal is 2 without a corner term.
             }
         }
         lines.pivots[row] = last;

@@ -240,7 +240,7 @@ fn refuses_what_does_not_fit() {
     let monitor = Monitor::default();
     let right = owned.problem();
     let elsewhere = |domain| Problem { domain, ..right };
-    // Wrong shape, overflowing shape, screening, mask and gradients.
+    // A wrong shape, an overflowing shape, and an invalid screening, mask or gradient are errors.
     let wrong = [
         elsewhere(Domain {
             shape: [5, 5, 1],

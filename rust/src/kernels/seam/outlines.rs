@@ -31,7 +31,8 @@ pub struct Evidence<'a> {
     pub inside: &'a [f32],
     /// Price of an outline that passes a pixel, at least 0.
     pub price: &'a [f32],
-    /// Evidence for the first outline: a pixel at distance d, positive inside, has the evidence `pull * d / reach`.
+    /// Evidence for the first outline. A pixel at distance d from it, positive inside, has the evidence `pull * d /
+    /// reach`, where `reach` is the half-width of the band.
     pub pull: f32,
 }
 

@@ -84,7 +84,7 @@ impl Triangle {
         Cholesky::new(&self.lower(), 1 << 32, &Monitor::default())
     }
 
-    /// Checks that three right-hand sides are solved, and that every unknown is in the order once.
+    /// Checks that three right-hand sides are solved, and that every unknown occurs once in the order.
     fn check(&self) {
         let size = self.starts.len() - 1;
         let wanted: Vec<f64> = (0..3 * size)

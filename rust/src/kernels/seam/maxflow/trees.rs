@@ -74,8 +74,8 @@ impl<const D: usize> Solver<D> {
         for axis in 0..D {
             for side in 0..2 {
                 let q = self.neighbour::<CYCLIC>(p, axis, side);
-                // Try the same arc again after an augmentation: the neighbour may be free now, or
-                // still in the other tree.
+                // Try the same arc again after an augmentation, because the neighbour may be free now, or still in the
+                // other tree.
                 while self.arc::<TREE>(p, q, axis, side) > 0 {
                     let (stamp, distance) = (self.node(p).stamp, self.node(p).distance + 1);
                     let node = self.node_mut(q);

@@ -75,8 +75,8 @@ impl Dual {
             self.queue.push(bound[k], start, 0);
             self.search::<true>(|f| f == goal, NEVER, between, monitor)?;
             let value = self.faces[goal as usize].distance;
-            // The goal may be unreachable: an earlier seam runs along P here, and is shorter than
-            // any seam through this face.
+            // The goal may be unreachable if an earlier seam runs along P here. That seam is shorter than any seam
+            // through this face.
             if value != NEVER {
                 let crossings = self.crossings(goal);
                 let name = k as u32 + 1;

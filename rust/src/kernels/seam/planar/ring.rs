@@ -1,8 +1,8 @@
 //! The cheapest seam around a core.
 //!
-//! The outside and the inside are each connected; the outside may be connected across the border of
-//! the grid. All seams are then closed paths on an annulus of the dual. Like a cylinder, it is cut
-//! open along a shortest path P from the outside to the inside.
+//! The outside and the inside are each connected. The outside may be connected across the border of the grid. All
+//! seams are then closed paths on an annulus of the dual. Like a cylinder, the annulus is cut open along a shortest
+//! path P from the outside to the inside.
 
 use super::cylinder::Cycle;
 use super::dual::Dual;

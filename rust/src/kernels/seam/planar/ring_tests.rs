@@ -144,7 +144,7 @@ fn drawn(picture: &[&str]) -> Option<Vec<bool>> {
 #[test]
 fn knows_what_it_cannot_do() {
     assert!(drawn(&["ooooo", "o...o", "o.x.o", "o...o", "ooooo"]).is_some());
-    // Cases: two cores, no core, and an outside in the middle.
+    // Two cores, no core, or an outside in the middle cannot be solved.
     assert!(drawn(&["oooooo", "ox..xo", "oooooo"]).is_none());
     assert!(drawn(&["ooo", "o.o", "ooo"]).is_none());
     assert!(drawn(&["xxxxx", "x...x", "x.o.x", "x...x", "xxxxx"]).is_none());
