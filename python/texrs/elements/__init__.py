@@ -1,6 +1,6 @@
-"""Analyse the repeated elements of a texture: their places and pixels (Liu et al. 2009, section 3).
+"""Analyse the repeated elements of a texture: their positions and pixels (Liu et al. 2009, section 3).
 
-`analyse` finds the elements automatically, or from a box around one of them and a few places of the background.
+`analyse` finds the elements automatically, or from a box around one of them and a few points of the background.
 `correct` corrects its mistakes, and `to_html` shows the result. `load` reads a file that `ElementAnalysis.save` wrote.
 `ElementAnalysis.of_sample` uses the known elements of a generated texture. `ElementAnalysis.instances` lists the
 elements one by one, and `ElementAnalysis.arrangement` describes their positions. `Layout` specifies how elements are

@@ -35,7 +35,7 @@ SHORTEST = 16
 AGAIN = 0.8
 """Minimum number of elements found with a better box, as a share of the number found with the proposed box."""
 SURE = 0.9
-"""Minimum confidence of the analysis of a material's colours for skipping the analysis of its other maps."""
+"""Confidence of the analysis of a material's colours above which its other maps are not analysed."""
 LITTLE, MUCH = 0.02, 0.95
 """Minimum and maximum plausible share of the image that is foreground."""
 
@@ -59,8 +59,9 @@ def analyse(
 
     All arguments except the image are optional. The element, the background and the layout are proposed if they are
     not given, and the report contains the confidence of each proposal. If joints divide the whole image, as in a wall
-    or a honeycomb, the elements are the cells, each with its own shape. With a ``box``, the cells must be about as
-    large as the box. Otherwise, or with a ``search``, the elements are the places that look like the chosen element.
+    or a honeycomb, the elements are the cells, each with its own shape. If a ``box`` is given, cells are used only if
+    they are about as large as the box. Otherwise, or if a ``search`` is given, the elements are the places that look
+    like the chosen element.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def analyse(
         one knot.
     mask : (H, W) array of bool, path or Mask, optional
         Mask of the foreground. If it is within the box, it is the foreground of the chosen element. Otherwise it is
-        the foreground of the whole image, and no graph cut is made.
+        the foreground of the whole image, and the graph cut is skipped. Default: found by a graph cut.
     background : (n, 2) points or (H, W) array of bool, optional
         Points (row, column) between the elements, where each marks a radius of 4 pixels. Python also accepts a mask of
         all known background.
@@ -86,7 +87,7 @@ def analyse(
         Options of the search: directions, sizes, minimum similarity and colour model.
     method : {None, "paper"}
         Method of the analysis. "paper" is the published algorithm with its misprints corrected: one channel, no cut,
-        nearest samples, no cleaning. Default: the algorithm with departures from the paper.
+        nearest samples, no cleaning. Default: the algorithm with the improvements of texrs.
     wrap : bool or (rows, columns)
         Axes along which the texture is tileable. Python also accepts a single bool for both. Default: none.
     seed : int
@@ -100,7 +101,7 @@ def analyse(
     Returns
     -------
     ElementAnalysis
-        The analysis: points by falling similarity, mask, layout and the directions of rows of points.
+        The analysis: points in order of falling similarity, mask, layout and the directions of rows of points.
 
     Raises
     ------
@@ -172,7 +173,7 @@ def analyse(
 
 
 def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) -> ElementAnalysis:
-    """Analyse the colours of a material, and also all its maps if the result is uncertain. Return the surer result."""
+    """Analyse the colours of a material, and all its maps if the result is uncertain. Return the surer result."""
     entries: list[ElementAnalysis] = []
     trouble: InvalidInput | None = None
     for pixels in (material.base, material.guide):
@@ -248,7 +249,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
 def _extend(
     guide: Floats, given: Arguments, start: Start, parted: Separation, how: Settings
 ) -> tuple[Start, Separation]:
-    """Extend separate elements by the surroundings that all share. Points and masks from the user are not changed."""
+    """Extend separate elements by surroundings common to all. Points and masks from the user are not changed."""
     said = given.points is not None or given.whole is not None or given.shape is not None
     if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
         return start, parted

@@ -20,7 +20,7 @@ Shape = tuple[int, int]
 Wrap = tuple[bool, bool]
 
 LEAST, MOST = 3, 100_000
-"""Minimum side of a box in pixels, and maximum number of points that a user can give."""
+"""Minimum side of a box in pixels, and maximum number of points that the user gives."""
 CENTRE = 0.5
 """Size of the central part of a box that certainly is foreground, as a share of its sides. Not used for a net."""
 MAIN = 0.5
@@ -95,7 +95,7 @@ class Arguments:
 
 
 def as_box(value: object, shape: Shape, name: str = "box") -> Box:
-    """Check a box (row, column, height, width): centre and size, inside the image."""
+    """Check a box (row, column, height, width): its centre and size. It must be inside the image."""
     wanted = f"{name}: must be (row, column, height, width), the centre and the size of a box in pixels"
     numbers = try_array(value, np.float64)
     if numbers.shape != (4,) or not np.isfinite(numbers).all():
@@ -116,7 +116,7 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
 
 
 def as_points(value: object, shape: Shape, name: str) -> Points:
-    """Check a list of points (row, column): finite, different, and inside the image."""
+    """Check a list of points (row, column), which must be finite, distinct, and inside the image."""
     wanted = f"{name}: must be points (row, column), shape (n, 2)"
     try:
         points = np.asarray(value, np.float64)
@@ -167,7 +167,7 @@ def as_background(value: object, shape: Shape) -> Bools | None:
 
 
 def choose_usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
-    """Return the box of the most typical component of a mask that is not cut by the border."""
+    """Return the box of the most typical component of a mask that the border does not cut."""
     regions = rank_pieces(label_components(mask, wrap)[0], LEAST**2)
     if not regions or layout == Layout.CONNECTED:
         raise InvalidInput("box: must be given, because no component of the mask is entirely inside the image")

@@ -24,12 +24,12 @@ class Arrangement:
     spacing : float
         Usual distance between neighbours, in pixels.
     lattice : ((float, float), (float, float)) or None
-        The two vectors of the lattice of the elements, (rows, columns) in pixels. None without a lattice.
+        Vectors a and b of the lattice of the elements, (rows, columns) in pixels. None without a lattice.
     courses : tuple of float or None
-        Rows, in pixels, of the courses of the elements. None without courses.
+        Rows of the courses of the elements, in pixels. None without courses.
     darker : bool
-        True if the pixels outside the foreground are darker than it. These are the background, the joints, or the
-        openings of a net.
+        True if the pixels outside the foreground are darker than the foreground. These are the background, the joints,
+        or the openings of a net.
 
     Examples
     --------

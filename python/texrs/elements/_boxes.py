@@ -15,9 +15,9 @@ from texrs.exemplar.segmentation import ElementOptions, segment
 SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
 """Standard deviations of the Gaussians for detecting blobs, in pixels."""
 A_KIND, PIECES = 3, 6
-"""Maximum number of boxes for blobs of one size, and for segmented areas."""
+"""Maximum number of boxes for blobs of one size, and maximum number for segmented areas."""
 BLOB = 2.6
-"""Side of the box around a blob, in standard deviations of its Gaussian.
+"""Side of the box around a blob, in standard deviations of the blob's Gaussian.
 
 The diameter of a disc is 2.83 standard deviations.
 """

@@ -40,9 +40,9 @@ Gaps between heaped fruit are dark enough for this, but sand between pebbles is 
 FEWEST = 4
 """Minimum number of cells."""
 NARROW = 0.75
-"""Width of the cells that are searched for, relative to the width of the given box.
+"""Width of the cells in the search, relative to the width of the given box.
 
-A smaller width also finds fine joints.
+With a smaller width, the search also finds fine joints.
 """
 ALIKE = 1.35
 """Maximum ratio between a side of the given box and the side of the usual cell, in either direction."""
@@ -70,7 +70,7 @@ class CellStart:
     found : Detections
         The cells, the most certain first.
     parted : Separation
-        The cells with the foreground. The foreground is the cells if they are jointed elements, and otherwise the
+        The cells with the foreground. If the elements are jointed, the foreground is the cells. Otherwise it is the
         joints.
     labels : (H, W) int32
         Cell of each pixel, from 1 in the order of the detections; 0 in joints.

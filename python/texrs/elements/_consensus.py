@@ -1,7 +1,7 @@
 """Extend separate elements by surroundings that all of them have in common.
 
-A cut by colours ends at a rim whose colours also occur in the background, and at the dark side of a lit element. If
-the surroundings of all elements are the same and differ from the background, they belong to the element.
+A cut by colours stops too early at a rim that has colours of the background, and at a dark side. If the surroundings
+of all elements are the same and differ from the background, they belong to the element.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from texrs.elements._mask import Wrap, round_to_odd, stamp
 __all__ = ["Extent", "extend_mask"]
 
 WIDE = 2.0
-"""Sides of the window around an element that is compared, relative to its box."""
+"""Sides of the compared window around an element, relative to its box."""
 FAR, LEAST = 1.3, 100
 """Distance from elements, in boxes, beyond which pixels are background.
 
@@ -33,10 +33,10 @@ Pixels above this ratio belong to the element.
 GROWN, GUESSED = 1.2, 0.4
 """Minimum ratio of the common area to the usual area of an element in the mask.
 
-The first value is for a certain mask, the second for a guessed one. Below it, the mask is kept.
+The first value is for a certain mask, the second for a guessed one. Below the value, the mask is not extended.
 """
 PASSES, MOST = 2, 64
-"""Number of passes that compare and align elements, and maximum number of elements that are compared."""
+"""Number of rounds that compare and align elements, and maximum number of elements that are compared."""
 NUDGE = 2
 """Maximum shift for aligning an element that is completely visible, in pixels.
 
@@ -134,7 +134,7 @@ def _look_around(
 
 
 def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, notched: bool) -> Bools | None:
-    """Return the connected area in the middle of a window, without holes.
+    """Return the connected area in the middle of a window, with its holes filled.
 
     None if the area is not compact or reaches the border of the window.
 

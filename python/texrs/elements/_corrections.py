@@ -57,9 +57,9 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
     Returns
     -------
     ElementAnalysis
-        The corrected analysis. Its report contains all steps under ``"corrections"``, those of earlier corrections
-        first. Given labels (`ElementAnalysis.of_labels`) are dropped by the first step. From then on, mask and points
-        define the elements.
+        The corrected analysis. Its report contains all steps under ``"corrections"``, starting with the steps of
+        earlier corrections. Given labels (`ElementAnalysis.of_labels`) are dropped by the first step. After that, mask
+        and points define the elements.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from texrs._typing import Array
 Picture = NDArray[np.uint8]
 
 CROSS = (255, 40, 40)
-"""Colour of points."""
+"""Colour of the crosses on points, red, green and blue, 0 to 255."""
 
 
 def draw_plain(image: Array) -> Picture:

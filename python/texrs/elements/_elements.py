@@ -1,4 +1,4 @@
-"""Define the analysis of a texture's elements, and store it in a file for splicing."""
+"""Define the analysis of a texture's elements, and store it in a file."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class ElementAnalysis:
     layout : Layout
         Layout of the elements: disjoint, connected or jointed. Values that `Layout` accepts are converted.
     scores : ndarray of shape (n,), float64
-        Similarity of each element to the chosen one, -1 to 1.
+        Similarity of each element to the chosen element, -1 to 1.
     directions : tuple of float
         Directions of the rows of points, in degrees in [0, 180), strongest first. Empty if they form no rows.
     wrap : tuple of bool
@@ -65,15 +65,15 @@ class ElementAnalysis:
     report : dict
         Results and decisions of the analysis, as text, numbers and lists.
     angles : ndarray of shape (n,), float64, optional
-        Rotation of each element relative to the chosen one, in degrees. It is one of the directions that were searched
-        for.
+        Rotation of each element relative to the chosen element, in degrees. Each is one of the directions of the
+        search.
     scales : ndarray of shape (n,), float64, optional
-        Size of each element relative to the chosen one. It is one of the sizes that were searched for.
+        Size of each element relative to the chosen element, 0.25 to 4. Each is one of the sizes of the search.
     sets : Similarity, optional
-        Result of `similarity`, if it was computed for storage.
+        Result of `similarity`, if it was computed so that `save` stores it.
     known : ndarray of shape (height, width), int32, optional
         Element of each pixel, from 1 in the order of the points, if it was given to `of_labels` or comes from certain
-        cells. Numbers after those of all points belong to elements that the border cuts.
+        cells. Higher numbers than the number of points are elements that the border cuts.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class ElementAnalysis:
         sample : Sample
             A texture of `texrs.samples` with centres and a mask.
         wrap : (bool, bool)
-            True for each axis, (rows, columns), along which the sample was generated tileable.
+            Axes (rows, columns) along which the sample was generated tileable.
 
         Returns
         -------
@@ -228,13 +228,13 @@ class ElementAnalysis:
 
     @cached_property
     def labels(self) -> Labels:
-        """Element of each pixel, (H, W) int32, from 1; 0 is the background.
+        """Element of each pixel, (H, W) int32, from 1. 0 is the background.
 
         The array is computed on first use and is read-only.
 
-        Element ``k + 1`` belongs to point ``k``. Higher numbers are components of the foreground, and cells, that have
-        no point. Separate elements are the components of the mask. A component with several points is divided between
-        them. For a connected texture whose cells are certain, the elements are the cells without their joints.
+        Element ``k + 1`` belongs to point ``k``. Higher numbers are cells and components of the foreground that do not
+        have a point. Separate elements are the components of the mask. A component with several points is divided
+        between them. For a connected texture whose cells are certain, the elements are the cells without their joints.
         Otherwise, each pixel belongs to the nearest element. Small components without a point are background.
 
         Examples

@@ -1,4 +1,4 @@
-"""Divide a foreground among elements: by connected components, and each component by the nearest element.
+"""Divide a foreground into elements: by connected components, and each component by the nearest element.
 
 Both `design`, which moves elements, and `splice`, which places them, use this division, so that their elements are the
 same.
@@ -43,9 +43,9 @@ class Division(NamedTuple):
 def divide_foreground(mask: Bools, points: Points, wrap: Wrap = (False, False)) -> Division:
     """Divide a foreground among elements, given by their centres.
 
-    A component with one centre belongs to this element.
+    A component with one centre belongs to the element of that centre.
 
-    A component with several centres is divided between these elements.
+    A component with several centres is divided between the elements of these centres.
     """
     component, count = label_components(mask, wrap)
     points, at, owner, joined = _claim(component, count, points, mask, wrap)
@@ -91,9 +91,9 @@ def _claim(
     points : (n, 2) float64
         Centres of elements, followed by the centres of components that become elements.
     at : (n, 2) intp
-        Pixel of each given element.
+        Pixel of the centre of each given element.
     owner : (n) int32
-        Component of each element, or 0 if it is not on the foreground.
+        Component of each element, or 0 if its centre is not on the foreground.
     joined : dict
         Component numbers, and for each the index of an element of another component that it belongs to.
 
@@ -125,9 +125,10 @@ def _claim(
 
 
 def _snap_centres(component: Labels, orphans: list[int], at: NDArray[np.intp], owner: Labels) -> NDArray[np.intp]:
-    """Move centres that are off the foreground, such as centres of rings, to the nearest pixel of their element.
+    """Move centres that are outside the foreground, such as centres of rings, to the nearest pixel of their element.
 
-    The element of such a centre is a component without another centre, whose bounding box contains this one.
+    The element of such a centre is a component that contains no other centre, and whose bounding box contains this
+    centre.
     """
     from scipy.ndimage import distance_transform_edt, find_objects
 

@@ -1,4 +1,4 @@
-"""Provide elements as separate instances, each with a mask, place, direction, size and confidence."""
+"""Provide elements as separate instances, each with a mask, position, direction, size and confidence."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Instance", "Labelled", "cut_instances", "find_sure_cells", "label_el
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Minimum confidence of cells for using them as elements."""
+"""Minimum confidence of cells that are used as elements."""
 LEAST = 3.0
 """Minimum width of cells in a search, in pixels."""
 MISSED, JOINT = 0.4, 0.5
@@ -50,10 +50,10 @@ class Instance:
     centre : (float, float)
         Row and column, in pixels.
     angle : float
-        Rotation relative to the chosen element, in degrees, if several directions were searched. Otherwise 0.
+        Rotation relative to the chosen element, in degrees, if the search had several directions. Otherwise 0.
     scale : float
-        Size relative to the chosen element, above 0, if several sizes were searched; 1 is its size. Otherwise the
-        square root of its area relative to the median area.
+        Size relative to the chosen element, above 0, if the search had several sizes. Otherwise the square root of its
+        area relative to the median area.
     confidence : float
         Probability that this is an element, 0 to 1, calibrated on annotated textures. It is derived from the
         similarity to the chosen element, or from how well the joints around a cell close. For foreground without a
@@ -92,7 +92,7 @@ class Labelled(NamedTuple):
 def rate_likeness(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the confidence (0 to 1) of detected elements from their similarity, calibrated on annotated textures.
 
-    No detection with a similarity below 0.5 was correct, 75 % at 0.74 were correct, and all above 0.85.
+    No detection with a similarity below 0.5 was correct. A share of 75 % was correct at 0.74, and all above 0.85.
     """
     odds = (1 + np.exp((EVEN - 1) / SPREAD)) / (1 + np.exp((EVEN - np.clip(scores, 0, 1)) / SPREAD))
     return np.asarray(np.round(odds, 9), np.float64)
@@ -139,7 +139,7 @@ def label_elements(
 ) -> Labelled:
     """Return the element of each pixel, with the centre and confidence of each element.
 
-    Elements with points come first. Components and cells without a point follow.
+    Elements with points are first. Components and cells without a point follow.
 
     Separate elements are the components of the mask. A component with several points is divided between them. For a
     connected texture whose cells are certain, the elements are the cells without their joints. Otherwise, the elements

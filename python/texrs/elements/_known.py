@@ -1,4 +1,4 @@
-"""Check and measure elements that are known for each pixel, as labels from their author or generator."""
+"""Check and measure known elements, which are given as a label for each pixel."""
 
 from __future__ import annotations
 

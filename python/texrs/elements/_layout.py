@@ -12,7 +12,7 @@ LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed", "F=d", "F=c"
 
 
 class Layout(StrEnum):
-    """How the elements of a texture are connected. It determines which parts can move.
+    """Connection between the elements of a texture. It determines which parts can move.
 
     The tags F=d, F=c and B=c of Liu et al. (2009) are accepted as well.
 

@@ -27,7 +27,7 @@ RADIUS = 4
 SAMPLES = 4000
 """Maximum number of colour samples of the foreground, and of the background, that a colour model is fitted to."""
 HOLE, SPECK = 0.1, 0.25
-"""Maximum area of a hole that is filled, as a share of the area around it.
+"""Maximum area of a hole that is filled, as a share of the area of its component.
 
 Minimum area of a component, as a share of the area of the chosen element.
 """
@@ -118,7 +118,7 @@ def cut_foreground(
     colours : (H, W, 3) float32
         Colours in Lab / 100.
     centres : (n, 2)
-        Centres of the elements, the chosen one first.
+        Centres of the elements in pixels, the centre of the chosen element first.
     box : tuple of int
         Height and width of the box of an element.
     background : (H, W) bool
@@ -126,8 +126,8 @@ def cut_foreground(
     layout : Layout
         Layout of the elements. For a net, a box can contain a mesh. Other elements cover the middles of their boxes.
     poses : (n, 2), optional
-        Rotation in degrees and relative size of each element. They are applied to the middle of its box. Default: all
-        like the chosen one.
+        Rotation in degrees and relative size of each element. They are applied to the middle of its box. Default: the
+        rotation and size of the chosen element.
     shape : bool, optional
         Foreground of the chosen element within its box, if it is known.
     """

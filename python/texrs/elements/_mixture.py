@@ -13,7 +13,7 @@ from texrs._progress import ask
 Doubles = NDArray[np.float64]
 
 COMPONENTS, ROUNDS = 5, 25
-"""Number of Gaussians of a mixture, and number of iterations of expectation and maximisation."""
+"""Number of Gaussians in a mixture, and number of iterations of expectation and maximisation."""
 FLOOR = 1e-3
 """Minimum variance of a Gaussian along any direction, as a share of the mean variance of the samples."""
 LEAST = 1e-5

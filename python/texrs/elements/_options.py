@@ -24,7 +24,7 @@ class ElementSearch:
     rotations : int
         Number of orientations to search for, 1 to 72, evenly spread over 360 degrees. 1 finds only upright elements.
     scales : sequence of float
-        Sizes to search for, relative to the box: 1 to 16 numbers from 0.25 to 4.
+        Sizes of elements in the search, relative to the box: 1 to 16 numbers from 0.25 to 4.
     threshold : float, optional
         Minimum similarity to the chosen element, -1 to 1. Default: the value that best separates two classes of
         candidates (Otsu).
@@ -81,7 +81,7 @@ class Settings:
     search: ElementSearch
     model: Model
     literal: bool
-    """True if the algorithm is used as published, with ``method="paper"``."""
+    """True if ``method="paper"``, which uses the algorithm as published."""
     wrap: tuple[bool, bool]
     seed: int
 

@@ -34,9 +34,9 @@ SMALL = 224
 GROWN, STEPS = 3, 5
 """Number of the best boxes that are resized step by step, and maximum number of steps."""
 AGAIN = 6
-"""Number of the best boxes that are moved to the middle of an object, and searched for again."""
+"""Number of the best boxes that are moved to the middle of an object, and then searched for again."""
 WIDE = 1.3
-"""Sides of the window for finding the object, relative to the box."""
+"""Sides of the window for locating the object, relative to the box."""
 OUT = 1.1
 """Minimum distance of a background pixel from the centre of an element, in half boxes."""
 PLACES = 12
@@ -153,7 +153,7 @@ def _report_part(progress: Callable[[float], object], low: float, high: float, s
 
 
 def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
-    """Return the box whose copies explain the most of a small image, and its confidence."""
+    """Return the box whose copies explain a small image best, and its confidence."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
     small = downscale(guide, step)
     with answering(progress, 0.0):
@@ -374,16 +374,16 @@ def _choose_layout(
 def _measure_odds(ratio: float) -> float:
     """Return the confidence of a choice made by comparing a ratio with 1.
 
-    It is 0.5 at ratio 1, and rises on both sides.
+    The confidence is 0.5 at a ratio of 1, and rises on both sides.
     """
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
 def compare_elements(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
-    """Return how much elements look like objects on a background, and their lightness difference to the rest.
+    """Return how much elements look like objects on a background, and their difference in lightness from the rest.
 
-    The openings of a net and the bricks between joints are even and similar, and lines, edges and colours are between
-    them. Objects have edges and colours of their own, and the background between them is even.
+    Openings of a net and bricks between joints are smooth and similar, and all lines, edges and other colours are
+    between them. Objects have edges and colours of their own, and the background between them is smooth.
     """
     from scipy.ndimage import gaussian_filter, gaussian_gradient_magnitude
 

@@ -22,7 +22,7 @@ CHANNELS = 8
 RADIUS = 2
 """Radius of the windows that an appearance vector describes: 5 x 5 pixels."""
 COVERED = 0.95
-"""Share of the map that must be covered by removed areas before the search for candidates ends (section 3.2)."""
+"""Share of the similarity map that must be removed before the search for candidates ends (section 3.2)."""
 CONTEXT = 1.3
 """Sides of the window that is compared, relative to the box.
 
@@ -31,10 +31,10 @@ The surroundings help to recognise an element, and the inside of a tile or a coi
 APART = 1.3
 """Sides of the area around a candidate that excludes other candidates, relative to the box.
 
-Boxes of neighbours can overlap, but seldom by more.
+Boxes of neighbours can overlap, but rarely by more than this.
 """
 RANGE = 0.25
-"""Minimum range of the scores of candidates for a threshold that separates two classes."""
+"""Minimum range of the scores of candidates. If the range is smaller, no threshold is applied."""
 BINS = 64
 """Number of bins, over [-1, 1], of the histogram whose entropy chooses a channel."""
 
@@ -185,7 +185,7 @@ def search_similar(
     options : ElementSearch
         Directions, sizes, minimum similarity and channels.
     cut : bool
-        If True, apply a threshold to the candidates, and drop those that overlap better ones.
+        If True, apply a threshold to the candidates, and drop candidates that overlap better ones.
     features : (H, W, 8) float32, optional
         Result of `describe_appearance` for the image, to save time if many boxes are searched for. Default: computed.
     progress : callable, optional
@@ -266,7 +266,7 @@ def choose_channel(maps: Floats) -> int:
 def suppress_non_maxima(
     map: Floats, boxes: Sequence[tuple[int, int]], which: NDArray[np.intp], wrap: Wrap, share: float = 1.0
 ) -> NDArray[np.intp]:
-    """Return local maxima, the best first. Each removes the area around it from the candidates.
+    """Return local maxima, the best first. Each maximum removes the area around it from the candidates.
 
     The result is (n, 2), in the order of choice.
     """

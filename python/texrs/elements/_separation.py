@@ -1,4 +1,4 @@
-"""Correct the detections and the mask of separate elements by each other (section 3.3, which leaves this open)."""
+"""Correct the detections of separate elements by their mask, and the mask by the detections (section 3.3)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from texrs.elements._mask import Wrap, ellipse, stamp_posed
 from texrs.elements._search import Detections
 
 ADDED = 0.25
-"""Minimum area of a component for an undetected element, as a share of the usual area."""
+"""Minimum area of a component that is added as an undetected element, as a share of the usual area."""
 SOLID, ROUND = 0.8, 0.9
 """Minimum share of its convex hull that an element fills, and minimum share for merging several detections in one component.
 """
@@ -28,7 +28,7 @@ JOINED, MESHED = 0.5, 0.25
 """Minimum area, in usual areas, of an undetected element between joints, and of an undetected mesh of a net.
 """
 TRUSTED = 0.7
-"""Minimum share of the detections that must be in plausible components. Otherwise the mask is replaced."""
+"""Minimum share of the detections that must be in plausible components. Below it, the mask is replaced."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,9 +40,9 @@ class Separation:
     points : (n, 2) float64
         Centres of the elements.
     scores : (n,) float64
-        Similarity of each element to the chosen one.
+        Similarity of each element to the chosen element.
     detection : (n,) intp
-        Index of the detection of each element, or -1 if it was not detected.
+        Index of the detection of each element, or -1 if the element was not detected.
     mask : (H, W) bool
         The foreground.
     made_by : str
@@ -171,10 +171,10 @@ def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> boo
 
 
 def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bool) -> Separation:
-    """Add undetected elements between joints, or undetected meshes of a net, that are like the detected ones.
+    """Add undetected elements between joints, or undetected meshes of a net, that are similar to the detected ones.
 
-    A component is added if no border cuts it, if it is as solid as an element, and if it has about the usual area.
-    Detections between joints are dropped if their component is far too small.
+    A component is added if no border cuts it, if it is as solid as an element, and if it has about the usual area. A
+    detection between joints is dropped if its component is far too small.
     """
     from skimage.measure import regionprops
 

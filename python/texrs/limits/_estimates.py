@@ -88,9 +88,9 @@ def estimate_memory(
         Size of the result. For CornerTiles, the size of its atlas of nine tiles a side. Default: the size of the first
         example.
     dtype : dtype
-        Value of ``method`` or ``quality``. Default: the default value of the verb.
+        Dtype of the example. Default: "uint8".
     method : str, optional
-        Value of ``method`` or ``quality``. Default: that of the verb.
+        Value of ``method`` or ``quality``. Default: the default value of the verb.
     field : bool
         If True, the call of solid or synthesize has a field that varies. Default: False.
 

@@ -50,9 +50,9 @@ def shade(surface: Surface) -> Floats64:
 
 
 def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
-    """Vertices at the same position are treated as one vertex, so the surface stays smooth where the atlas is cut.
+    """Return the outward normal of each vertex: the mean of the faces there, except those beyond a sharp edge.
 
-    Vertices at the same position count as one, so the surface stays smooth where the atlas is cut.
+    Vertices at the same position count as one vertex, so the surface stays smooth where the atlas is cut.
     """
     sides = vertices[faces]
     across = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])

@@ -34,7 +34,7 @@ FINE = 1.0, 1.6
 HALVED, FIRST = 400, 4
 """Minimum longer side in pixels for first rounds at half the resolution; and maximum number of these rounds."""
 RIGHT, STRAIGHT = (8.0, 15.0), 20.0
-"""Minimum longer side in pixels for starting at half the resolution; and maximum number of rounds there.
+"""Maximum errors of slant and tilt of a correct plane; and slant below which a larger error of the tilt is accepted.
 
 All are in degrees. A small slant does not determine the tilt well.
 """
