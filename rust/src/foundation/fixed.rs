@@ -100,7 +100,7 @@ impl<const D: usize> Frames<'_, D> {
         }
     }
 
-    /// Whether the frame is the identity at every point.
+    /// Returns whether the frame is the identity at every point.
     pub fn is_identity(&self) -> bool {
         matches!(self, Self::Constant(frame) if *frame == identity())
     }

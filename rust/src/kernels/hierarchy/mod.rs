@@ -3,8 +3,8 @@
 //! | part | content |
 //! |---|---|
 //! | [`merge`] | merge trees of a region adjacency graph |
-//! | [`candidates`] | all nodes of several trees, each once, also with their holes filled |
-//! | [`measure`] | sums over the regions of each node, and along its border |
+//! | [`candidates`] | all nodes of several trees without duplicates, also with their holes filled |
+//! | [`measure`] | sums over the regions of each set and along its border, and the shape of its convex hull |
 
 pub mod candidates;
 pub mod measure;

@@ -92,7 +92,7 @@ impl Index {
     }
 }
 
-/// Whether one exemplar is the mirror image of the other.
+/// Returns whether one exemplar is the mirror image of the other along the given axes.
 fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -> bool {
     one.shape == other.shape
         && match channels {

@@ -37,7 +37,7 @@ fn multiply<const N: usize>(
     sums
 }
 
-/// Whether a positive definite matrix may have this number on the diagonal.
+/// Returns whether the number can be a diagonal entry of a positive definite matrix.
 #[inline(always)]
 pub(super) fn is_pivot(number: f64) -> bool {
     number > 0.0 && number < f64::INFINITY

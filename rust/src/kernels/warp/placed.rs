@@ -88,7 +88,7 @@ impl Motion {
         })
     }
 
-    /// Whether the map sends whole pixels to whole pixels.
+    /// Returns whether the map moves whole pixels to whole pixels.
     fn is_whole(&self) -> bool {
         let mut parts = self.matrix.as_flattened().iter().chain(&self.shift);
         parts.all(|x| x.round_ties_even() == *x)

@@ -50,7 +50,7 @@ impl Triangle {
         (doubled(&self.target), doubled(&self.source))
     }
 
-    /// Whether the warp flips or flattens the triangle.
+    /// Returns whether the warp flips or flattens the triangle.
     #[inline(always)]
     pub(super) fn turned(&self) -> bool {
         let (after, before) = self.areas();

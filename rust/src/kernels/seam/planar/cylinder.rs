@@ -165,7 +165,7 @@ impl Dual {
         self.path = path;
     }
 
-    /// Whether a step separates two pixels, and at least one of them is between two seams.
+    /// Returns whether a step separates two pixels and at least one of these pixels is between two seams.
     pub(super) fn within(&self, f: u32, direction: usize, between: Between) -> bool {
         let f = self.original(f) as usize;
         let (below, j) = (f / self.width - 1, f % self.width);

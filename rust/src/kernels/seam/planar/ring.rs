@@ -133,7 +133,7 @@ impl Annulus {
         }
     }
 
-    /// Whether the outside and the inside are each connected.
+    /// Returns whether the outside is connected and the inside is connected.
     fn is_whole(&self) -> bool {
         let count = |side| self.sides.iter().filter(|&&s| s == side).count();
         let Some(core) = self.sides.iter().position(|&s| s == Side::Inside) else {
