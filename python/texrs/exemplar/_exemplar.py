@@ -53,7 +53,10 @@ T = TypeVar("T")
 
 FORMAT = 2
 CACHED = 256 << 20
-"""Maximum size, in bytes, of the cache of facts, which are keyed by content. A single larger fact is cached alone."""
+"""Maximum size, in bytes, of the cache of facts, whose keys depend on the content.
+
+A single larger fact is cached alone.
+"""
 _SMALL = 1 << 12
 _ANALYSED, _SAID = 256, 1 << 24
 """Maximum size of a saved analysis in bytes per sample, and maximum size of the other parts of the file in bytes."""
@@ -62,10 +65,11 @@ _ANALYSED, _SAID = 256, 1 << 24
 class Exemplar:
     """An example together with the facts that texrs derives from it.
 
-    Every function that synthesises from an example takes an array or an `Exemplar`. Facts about the example, such as
+    Every function that synthesises from an example accepts an array or an `Exemplar`. Facts about the example, such as
     its pyramid of windows, are computed once. They stay with the exemplar, and are cached for a while for any array
     with the same content. A pickled exemplar contains its pixels, its options and the small facts. Large facts (the
-    pyramid, the elements) would make it 20 times as large, so each process computes them again when it needs them.
+    pyramid, the elements) would make the pickle 20 times as large, so each process computes them again when it needs
+    them.
 
     Parameters
     ----------
@@ -180,7 +184,7 @@ class Exemplar:
 
     @property
     def repeat(self) -> tuple[bool, ...]:
-        """Axes along which the example is periodic: as given, or measured at all levels of its pyramid."""
+        """Axes along which the example is periodic: as given, or measured at all levels of the pyramid."""
         return self.cached("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
@@ -189,8 +193,8 @@ class Exemplar:
         Parameters
         ----------
         radii : sequence of int
-            Radius of the windows at each level, from the coarsest on, in samples, 1 to 8. The last radius is used for
-            all further levels.
+            Radius of the windows at each level, in samples, 1 to 8, starting with the coarsest level. The last radius
+            is used for all further levels.
         coarsest : int
             Minimum side of the coarsest level, in samples.
 
@@ -242,11 +246,12 @@ class Exemplar:
         k : int
             Number of similar samples per sample, 1 to 16.
         n : int
-            Side of the box around each chosen sample, in samples. No other sample inside it is chosen. Must be odd.
+            Side of the box around each chosen sample, in samples. No other sample inside the box is chosen. Must be
+            odd.
         numbers : {8, 24}
             Number of leading components of the appearance vectors that are compared.
         progress : callable, optional
-            Function that is called with the share of the work that is done.
+            Function that is called with the finished share of the work, 0 to 1.
 
         Returns
         -------
@@ -368,8 +373,7 @@ class Exemplar:
         fact : hashable
             Key of the fact: a name and all options that the fact depends on.
         make : callable
-            Function that computes the fact. If the result has an attribute ``nbytes``, it counts as the size in the
-            cache.
+            Function that computes the fact. If the result has an attribute ``nbytes``, this is its size in the cache.
 
         Returns
         -------

@@ -17,7 +17,7 @@ CLASSES = 48
 SAMPLES = 6000
 """Maximum number of samples for computing a palette."""
 MOST = 6.0
-"""Maximum surprise of a pair, in nats. Larger values are clipped, and costs are divided by it."""
+"""Maximum surprise of a pair, in nats. Larger values are clipped, and costs are divided by this maximum."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

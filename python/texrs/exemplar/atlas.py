@@ -36,11 +36,11 @@ STEP = 1.25
 SMALLEST, LARGEST = 1 / 8, 4.0
 """Minimum and maximum factor of a resized copy."""
 BARRED = 2047
-"""Fourth value of a demand for excluded samples. No output requests it."""
+"""Fourth value of a demand for excluded samples. No output requests this value."""
 RESIZED = 0.1
-"""Cost of taking a sample from a resized copy, relative to the cost of a scale error of the same ratio."""
+"""Cost of a sample from a resized copy, relative to the cost of a scale error of the same ratio."""
 BAND = 1 << 15
-"""Number of places that are processed at once, to limit memory."""
+"""Number of positions that are processed at once, to limit memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class Atlas:
     copies : tuple of Copy
         The copies. The first is the exemplar in its own size.
     levels : tuple of AtlasLevel
-        The atlas at each resolution, the coarsest first.
+        The atlas at each resolution, starting with the coarsest.
 
     """
 
@@ -210,7 +210,7 @@ def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, flo
 def find_box(
     logs: Floats, factor: float, wanted: tuple[float, float] | None, least: int
 ) -> tuple[int, int, int, int] | None:
-    """Return the part of the exemplar that has requested scales when it is resized. None if there is none.
+    """Return the part of the exemplar that has requested scales after it is resized. None if there are none.
 
     The part is (first row, end row, first column, end column).
     """

@@ -1,9 +1,9 @@
 """Find the cells of a connected texture: bricks in mortar, stones between gaps, honeycomb, scales.
 
-Joints are lines that are darker or lighter than the cells between them. Neither is known in advance, nor is the size
-of cells, so dark and light joints are tried with several sizes. The best tessellation has closed joints, and solid
-cells of one size without joints inside. Each tessellation starts with too many cells. Neighbours are then merged
-unless the joint between them, their common shape, or the usual size of cells supports two cells.
+Joints are lines that are darker or lighter than the cells between them. The sizes of cells and the lightness of joints
+are not known in advance, so dark and light joints are tried with several sizes. The best tessellation has closed
+joints, and solid cells of one size without joints inside. Each tessellation starts with too many cells. Neighbours are
+then merged unless the joint between them, their common shape, or the usual size of cells is evidence for two cells.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Cells:
     whole : (n,) bool
         True if no border of the image cuts the cell.
     certain : (n,) float64
-        Certainty of each cell, 0 to 1: how well its joints close, times how free of joints it is inside.
+        Certainty of each cell, 0 to 1: how completely its joints close, times how free of joints its inside is.
     joints : (H, W) float32
         Joint strength: 0 inside cells, about 1 in joints.
     confidence : float
@@ -158,7 +158,7 @@ def find_cells(
     size : float, optional
         Approximate width of a cell across its shorter axis, in pixels. Default: estimated.
     joints : (H, W) array of bool, optional
-        Mask of known joints. It gives one additional tessellation to choose from.
+        Mask of known joints. It gives one more tessellation, and the best of all is returned.
     progress : callable, optional
         Function that is called as ``progress("cells", share)``. An exception from it stops the work.
 
@@ -368,7 +368,7 @@ def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tess
 
 
 def _average(values: Array, labels: Labels, where: Bools, count: int) -> NDArray[np.float64]:
-    """Return the mean of values over the selected pixels of each label. 0 if none is selected."""
+    """Return the mean of values over the selected pixels of each label, or 0 if none is selected."""
     chosen = labels[where]
     number = np.bincount(chosen, minlength=count + 1)[1:]
     return np.asarray(np.bincount(chosen, values[where], count + 1)[1:] / np.maximum(number, 1))

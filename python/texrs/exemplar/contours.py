@@ -93,7 +93,7 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
 def paint(polygons: Polygons, shape: tuple[int, ...]) -> Labels:
     """Return the number of the polygon that contains each pixel, from 1.
 
-    Pixels in no polygon or in several polygons are 0.
+    Pixels in no polygon or in several polygons have the value 0.
     """
     from skimage.draw import polygon
 

@@ -53,7 +53,7 @@ class Courses:
     Attributes
     ----------
     axis : int
-        Axis across the courses: 0 for horizontal courses, 1 for vertical ones.
+        Axis across the courses: 0 for horizontal courses, 1 for vertical courses.
     slope : float
         Slope of the courses, in pixels along `axis` per pixel along the other axis.
     joints : tuple of float
@@ -119,7 +119,7 @@ def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
     """Return the share of the gradient across rows that is common to all strips, 0 to 1, and the slope of courses.
 
-    This is the slope for which the share is largest.
+    The slope is the value for which the share is largest.
     """
     first = max(0, light.shape[1] - WINDOW) // 2
     strips, away = cut_strips(light[:, first : first + WINDOW])

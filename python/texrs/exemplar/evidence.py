@@ -21,7 +21,7 @@ pixels.
 
 
 def measure_creases(lab: Floats) -> Floats:
-    """Return the depth of a dark line at each pixel, 0 where there is none.
+    """Return the depth of the dark line at each pixel, or 0 without a line.
 
     The depth is the larger principal curvature of the lightness.
     """
@@ -44,7 +44,7 @@ class Evidence:
     spread: float
     """Standard deviation of the areas of elements, divided by their mean."""
     solidity: float
-    """Share of their convex hulls that elements fill. It is small if gaps were taken for elements."""
+    """Share of their convex hulls that elements fill. It is small if gaps are mistaken for elements."""
     inside: float
     """Ratio of the contrast, or the crease depth, along outlines to the contrast inside elements."""
     outside: float

@@ -29,7 +29,7 @@ class Frontal(Copies):
     Attributes
     ----------
     size : float
-        Scale of its elements.
+        Scale of the exemplar's elements.
 
     """
 

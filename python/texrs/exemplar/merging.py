@@ -104,8 +104,8 @@ def join_least_parted(parts: Labels, relief: Floats, weigh: Weigh, join: Join, *
         Strength of the separation at each pixel. The larger value of two neighbouring pixels is used.
     weigh : callable
         ``weigh(one, other, total, length)`` returns the evidence against merging pairs of labels. ``total`` is the sum
-        of the relief along their border, and ``length`` is its number of pixel pairs. It is called once for all pairs,
-        and after each merge for one label and its neighbours.
+        of the relief along their border, and ``length`` is the border's number of pixel pairs. The function is called
+        once for all pairs, and after each merge for one label and its neighbours.
     join : callable
         ``join(one, other, length)`` is called before the label ``other`` becomes ``one``.
     below : float

@@ -44,7 +44,7 @@ def index_patches(
 def place_patches(
     found: Inpainting, mirrors: Sequence[Flip], shape: tuple[int, int]
 ) -> tuple[tuple[NDArray[np.intp], ...], Floats, list[Floats]]:
-    """Return the pixels that patches filled, and where in the exemplar (without mirroring) each was copied from.
+    """Return the pixels that patches filled, and the unmirrored position in the exemplar that each was copied from.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def place_patches(
 def choose_usual_side(shorter: int) -> int:
     """Return the default side of a patch, in pixels, from the length of the shorter side of an exemplar.
 
-    It is about the size of an element in a typical exemplar.
+    This is about the size of an element in a typical exemplar.
     """
     return min(shorter, max(12, min(32, shorter // 6)))
 

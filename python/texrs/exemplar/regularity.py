@@ -39,12 +39,14 @@ REGULAR = 0.3
 DIP = 0.75
 """Maximum ratio of the smallest correlation between the centre and a peak to the correlation at the peak.
 
-If the ratio is larger, the peak belongs to a stripe and is not a period.
+If the ratio is larger, the peak is part of a stripe and does not give a period.
 """
 NEAR = 2
 """Search distance around the expected multiple of a period, in pixels."""
 OFTEN = 64
-"""Number of nearest peaks that periods are fitted to one by one. Farther out, they are fitted once per ring of peaks.
+"""Number of nearest peaks to which periods are fitted one by one.
+
+Farther out, periods are fitted once per ring of peaks.
 """
 BENT = 0.15
 """Maximum stretch or shear of an image to fit whole periods of its lattice."""
@@ -56,7 +58,7 @@ Results are then the same on every processor.
 FARTHEST = 4096.0
 """Maximum length of listed shifts, in pixels."""
 LEANS = 3.0
-"""Divisor of the mirror measure of lattices that lean, in standard errors, so that 3 count as one.
+"""Divisor of the mirror measure for lattices with oblique axes, in standard errors, so that 3 count as one.
 
 A wall photographed slightly obliquely has up to 10.
 """
@@ -140,7 +142,7 @@ class Lattice:
         return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
 
     def close(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64] | None:
-        """Return the smallest linear change of an image after which whole periods of its lattice fit a given size.
+        """Return the smallest linear change of an image after which whole periods of its lattice fit into a given size.
 
         The result is a matrix that acts on (row, column). After the change, the height and the width are lattice
         translations, along the axes that wrap. Courses and joints that end at one side of a tileable texture then

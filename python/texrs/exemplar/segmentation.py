@@ -237,8 +237,8 @@ def segment(
         Options for finding the elements.
     progress : callable or True, optional
         Function that is called as ``progress("segment", share)`` with a rising share. An exception from it stops the
-        work. True shows a progress bar. The longest step between two calls splits touching elements. It takes 1 s for
-        1024 x 1024 pixels, and grows with their number.
+        work. True shows a progress bar. The longest step between two calls splits touching elements. This step takes 1
+        s for 1024 x 1024 pixels, and its duration grows with the number of elements.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Seg
 def draw_cells(height: int, width: int) -> Labels:
     """Divide an image into jittered Voronoi cells, for images without separate elements.
 
-    Every other cell is an element, as on a chequerboard. The others are the background.
+    Alternate cells are elements, as on a chequerboard. The others are the background.
     """
     from scipy.spatial import KDTree
 

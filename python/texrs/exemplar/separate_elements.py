@@ -1,8 +1,8 @@
 """Find separate elements of an exemplar by their colours, as areas on a connected background.
 
 Colours are reduced to a small palette. The background is the connected part of the palette whose removal leaves many
-bounded areas. It is accepted only if it meets all criteria. Textures without such a background are better cut by the
-frequency of neighbouring colours (`texrs.exemplar.adjacency`).
+bounded areas. A background is accepted only if it meets all criteria. Other textures are better cut by the frequency
+of neighbouring colours (`texrs.exemplar.adjacency`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Instances", "find_instances"]
 COLOURS = 6
 """Number of colours of the palette."""
 LEAST = 6
-"""Minimum number of areas, and minimum number of samples of an area that counts."""
+"""Minimum number of areas, and minimum number of samples of an area."""
 LARGEST = 0.15
 """Maximum size of an element, as a share of the total size of all elements."""
 FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
@@ -47,7 +47,7 @@ class Instances:
     Attributes
     ----------
     labels : uint32 array
-        Number of the element of each sample, 0 for none. Samples where two elements touch are 0.
+        Index of the element of each sample, from 1, and 0 for none. Samples where two elements touch are 0.
     depth : float32 array
         Distance of each sample to the background, 0 in the background.
 
@@ -129,7 +129,7 @@ def _measure_depth(mask: Bools, wrap: Sequence[bool]) -> Floats:
 
 
 def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
-    """Return the areas that are left if some palette colours are taken as the background, with a score.
+    """Return the areas that remain if some palette colours are used as the background, with a score.
 
     The areas are tried unchanged and eroded by one sample, which separates areas that just touch.
     """

@@ -53,7 +53,7 @@ class Shapes:
         return np.where(self.area > 0, self.area / np.maximum(_measure_hulls(self.reach), 1.0), 0.0)
 
     def compare_solidity(self, one: Any, other: Any) -> tuple[Any, Any]:
-        """Return the filled share of the hulls of two labels taken separately, and of the hull of their union."""
+        """Return the filled share of the convex hulls of two separate labels, and of the hull of their union."""
         area = self.area[one] + self.area[other]
         apart = _measure_hulls(self.reach[one]) + _measure_hulls(self.reach[other])
         return area / apart, area / _measure_hulls(np.maximum(self.reach[one], self.reach[other]))

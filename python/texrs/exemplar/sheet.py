@@ -33,15 +33,15 @@ __all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measur
 OPEN = (False, False)
 """Axes along which a sheet is periodic: none."""
 GAP = 8
-"""Number of samples between copies. It is so large that patches do not cross the gap."""
+"""Number of samples between copies. Patches cannot cross a gap of this size."""
 BLURRED = 1.8
 """Maximum enlargement of parts of a flattened plane. Parts that need more are excluded."""
 NEAR = 0.7
 """Share of the largest scale above which parts are always included."""
 FAR = 3.0
-"""Maximum enlargement of any part of a plane if only part of the exemplar is known.
+"""Maximum enlargement of any part of a plane if only a part of the exemplar is known.
 
-The area near the horizon would be larger than any other.
+Without this limit, the area near the horizon would be larger than any other.
 """
 MOST = 1 << 19
 """Maximum number of samples of a flattened plane."""
@@ -57,7 +57,7 @@ GOOD, FAIR = 0.03, 0.08
 FORESHORTENED = 0.2
 """Minimum increase of edge steepness with distance, if a plane fits fairly.
 
-It is less than 1 because few edges are exactly across the slope.
+The value is less than 1 because few edges are exactly across the slope.
 """
 FRONTAL = 0.05
 """Minimum increase of edge steepness with distance, if a plane fits well.
@@ -81,10 +81,10 @@ Elements are foreshortened along the slope and look wrong along other lines.
 HALF = 0.5
 """Exponent of the foreshortening if the target is not a plane.
 
-No surface has such sizes, and a lower exponent shears patches less.
+No surface has such sizes, and patches are sheared less with a lower exponent.
 """
 EXCESS = 38
-"""Cost of showing larger parts, which are reduced, in 1/256 of the cost of showing smaller parts, which are blurred.
+"""Cost of parts that are too large and are reduced, in 1/256 of the cost of parts that are too small and are blurred.
 """
 FINE = 0.05
 """Share of a target, at either end of its sizes, that is ignored when the resolution of a sheet is chosen."""
@@ -326,7 +326,7 @@ class Copies(Sheet):
     copies : tuple of Copy
         The copies. The first is the exemplar in its own size.
     owner : (rows, columns) uint16
-        Number of the copy that contains each sample.
+        Index of the copy that contains each sample.
 
     """
 
@@ -393,7 +393,7 @@ class Copies(Sheet):
     def side(self, target: Floats) -> float:
         """Return the side of a patch in samples, as a share of the exemplar's side.
 
-        It is less if scales vary within a patch.
+        The side is smaller if scales vary within a patch.
         """
         logs = log_single(target)
         down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
@@ -446,9 +446,10 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
 
     A scale map contains widths of elements, or square roots of their areas. On a plane in perspective, the square
     roots of areas are the 3/2 power of the widths. The plane describes widths (see `Plane.power`). If neither the
-    caller nor the map specifies which, the better fit is used. Measured maps deviate from a plane, and maps of round
-    elements that get smaller can fit a plane. Edges therefore decide: on a plane, they get steeper along the slope
-    with distance. A good fit requires only a small increase of steepness. Without any increase, the fit is rejected.
+    caller nor the map specifies the kind, the kind that fits better is used. Measured maps deviate from a plane, and
+    maps of round elements that get smaller can fit a plane. Edges therefore decide: on a plane, they get steeper along
+    the slope with distance. A good fit requires only a small increase of steepness. Without any increase, the fit is
+    rejected.
     """
     holds = find_kind(scale) if scale_kind is None else scale_kind
     plane = Slope.fit(scale, AREAS if holds == "area" else 1.0)
@@ -464,7 +465,7 @@ def find_plane(colours: Floats, scale: Floats, scale_kind: Kind | None = None) -
 def _measure_foreshortening(colours: Floats, plane: Slope) -> float:
     """Return the exponent with which edges get steeper along the slope as scales fall.
 
-    It is 1 on a plane whose edges are along or across the slope.
+    The exponent is 1 on a plane whose edges are along or across the slope.
     """
     from scipy import ndimage
 

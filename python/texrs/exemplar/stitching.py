@@ -15,7 +15,7 @@ from texrs.exemplar.separate_elements import Instances
 __all__ = ["guess_instances", "make_stitcher"]
 
 REACH, DEEP = 3.0, 8.0
-"""Depth in pixels beyond which all seams inside an uncertain element cost the same, and the depth whose cost they have.
+"""Depth in pixels beyond which all seams inside an uncertain element cost the same, and the depth that gives this cost.
 """
 
 

@@ -21,7 +21,7 @@ ALL: tuple[Flip, ...] = (NONE, (True, False), (False, True), (True, True))
 """All mirror images of an exemplar. The first is the exemplar itself."""
 
 POLAR, SUSPECT = 5.0, 4.5
-"""Difference between an exemplar and its mirror image, in standard errors, that is certain, and that is suspected.
+"""Minimum differences between an exemplar and its mirror image, in standard errors: certain, and suspected.
 
 With a threshold of 3.5, heaps of fruit would be mirrored only left to right, and elements would face each other.
 """
@@ -30,7 +30,7 @@ With a threshold of 3.5, heaps of fruit would be mirrored only left to right, an
 def find_mirrors(guide: Floats, sure: float = POLAR) -> tuple[Flip, ...]:
     """Return the mirror images that look like the exemplar itself, which is the first.
 
-    For example, a texture lit from the left does not look like its mirror image, which is lit from the right.
+    For example, if a texture is lit from the left, its mirror image is lit from the right.
 
     A mirror image is excluded if it differs by at least ``sure`` standard errors.
     """
