@@ -22,7 +22,7 @@ fill it.
 See Also
 --------
 texrs.SolidTexture.to_dask, texrs.SolidTexture.to_zarr : Parts of unbounded textures of any size.
-texrs.SourceMap.to_dask, texrs.SourceMap.to_zarr : Maps of a result, looked up where they are asked for.
+texrs.SourceMap.to_dask, texrs.SourceMap.to_zarr : Maps of a result, computed on demand.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ class InParts(ABC):
         Returns
         -------
         dask.array.Array
-            The part in the exemplar's dtype, channels last. Its values are equal to those of windows.
+            The part in the exemplar's dtype, channels last. Its values equal the values of windows.
 
         Raises
         ------

@@ -247,7 +247,7 @@ def apply(
     Raises
     ------
     InvalidInput
-        If the number or size of the exemplars differs from those of the source map, or the type of the map is unknown.
+        If the number or size of the exemplars differs from the source map, or the type of the map is unknown.
 
     Examples
     --------

@@ -252,7 +252,7 @@ class CornerTiles(InParts):
         Returns
         -------
         Synthesis
-            Window, with all maps of a material, and its source map. Its labels are those of the atlas.
+            Window, with all maps of a material, and its source map. Its labels are the labels of the atlas.
 
             Stages:
 

@@ -79,7 +79,7 @@ class Exemplar:
     axes : int
         Number of axes: 2 for an image, 3 for a volume.
     labels : bool, optional
-        If True, the values are unordered classes and are looked up at the nearest sample, whatever the interpolation.
+        If True, the values are unordered classes and are copied from the nearest sample, with any interpolation.
         Default: True for one channel of integers or bool with 2 to 16 values, such as a mask of 0 and 255.
     repeat : bool, or one per axis, optional
         Axes along which the example is periodic. Default: measured.

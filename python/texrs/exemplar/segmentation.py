@@ -59,7 +59,7 @@ class ElementOptions:
     Raises
     ------
     InvalidInput
-        If a field has another type or is out of range. The message names it.
+        If a field has another type or is out of range. The message contains its name.
 
     Examples
     --------

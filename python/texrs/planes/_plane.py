@@ -464,8 +464,8 @@ class Plane:
         Returns
         -------
         (..., 2) float64
-            Rows and columns on the plane, from the middle of the image and in pixels there. Points beyond the horizon
-            get distant positions without meaning.
+            Rows and columns on the plane, from the middle of the image and in pixels there. Positions of points
+            beyond the horizon are meaningless.
 
         Raises
         ------

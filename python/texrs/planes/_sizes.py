@@ -77,7 +77,7 @@ class ScaleEstimate:
         too small for patterns.
     shape : {"plane", "curved", "free", "even"}
         Surface that was measured. "plane": a plane. "curved": sizes that are quadratic in the position, as on a
-        cylinder or a bulge. "free": neither. "even": no agreement, so all elements are taken to be equally large.
+        cylinder or a bulge. "free": neither. "even": no agreement, so all elements are assumed to be equally large.
     plane : Plane or None
         The plane that was found. None for other shapes, and for a plane that only fits the measured sizes.
     confidence : float

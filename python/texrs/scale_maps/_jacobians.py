@@ -149,7 +149,7 @@ def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
     coordinates : (rows, columns, 2) float array
         Coordinates (row, column) on the surface, in pixels of the texture at its normal size. UV coordinates with v up
         become ``np.stack([(1 - v) * h, u * w], axis=-1)`` if the texture has h x w pixels. NaN marks pixels without a
-        surface, which take the Jacobian of the nearest surface. Coordinates may jump between parts of the surface and
+        surface, which get the Jacobian of the nearest surface. Coordinates may jump between parts of the surface and
         at seams of its texture.
 
     Returns

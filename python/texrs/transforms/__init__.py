@@ -1,7 +1,7 @@
 """Data augmentation: new images of the same texture for training, with their labels and boxes.
 
-`TextureAugment` takes plain arrays. `texrs.transforms.albumentations` and `texrs.transforms.torchvision` offer it as a
-transform of these libraries. Import these two modules explicitly, because they require the libraries.
+`TextureAugment` accepts plain arrays. `texrs.transforms.albumentations` and `texrs.transforms.torchvision` offer it as
+a transform of these libraries. Import these two modules explicitly, because they require the libraries.
 """
 
 from texrs.transforms._augment import Augmented, TextureAugment
