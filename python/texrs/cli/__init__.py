@@ -65,6 +65,7 @@ NAMES.update(COMMANDS)
 
 def load(name: str) -> Callable[..., None]:
     """Import the module of a command and return its function."""
+    # Import only the module of this command, so that other commands start quickly.
     match name:
         case "analyse" | "database":
             from texrs.cli import _elements

@@ -74,6 +74,7 @@ def analyse_command(
     if page is not None:
         _outputs.check_outputs({"out": out, "page": page})
         _outputs.check_output(page, option="page")
+    # Read the files only now, after the checks of all other options and of the outputs.
     about = About(roles=read_roles(role))
     with warnings.catch_warnings(record=True) as left:
         warnings.simplefilter("always")
@@ -88,6 +89,7 @@ def analyse_command(
         entry = analyse(**PICTURED.call(options), progress=progress)
         if given["similarity"]:
             entry = entry.with_similarity()
+    # Write the analysis, and then the pictures of its stages and the page.
     with _outputs.write_output(out) as temporary:
         entry.save(temporary)
     if stages is not None:

@@ -67,12 +67,14 @@ def samples_command(
         for name in chosen:
             say(name)
         return
+    # Check all outputs before a sample is drawn.
     _outputs.check_folder(out)
     records = {name: replace(record, files={}) if (record := _provenance.narrow([name])) else None for name in chosen}
     for name in chosen:
         with _provenance.record(records[name]):
             check_free(os.path.join(out, f"{name}.png"))
             check_free(os.path.join(out, f"{name}.tif"))
+    # Draw all samples before one is written, so that an invalid option leaves no files.
     made = {}
     for name in chosen:
         options: dict[str, Any] = {} if seed is None else {"seed": seed}

@@ -93,6 +93,7 @@ class InParts(Verb):
                 raise InvalidInput(
                     f"{as_flag(name)}: cannot be combined with {_list(said)}, because the result is written in parts"
                 )
+        # Refuse the options of materials, which are not written in parts.
         stack = Stack.take(given)
         for flag, value in stack.list_writing().items():
             if value is not None:
@@ -104,6 +105,7 @@ class InParts(Verb):
         values = {**self.knows(given), **values}
         about = About(axes=axes, roles=stack.roles, spacing=values.get(("spacing",)))
         call = options.call(values | options.read(given, about, which=lambda option: option.name == "field"))
+        # Refuse other options that unbounded textures do not have.
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
             if name not in (*TAKEN, "size", "progress") and value is not usual[name] and value != usual[name]:

@@ -169,6 +169,7 @@ def rerun_command(
     command = context.find_root().command.get_command(context, recipe.verb)  # type: ignore[attr-defined]
     if command is None:
         raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not have")
+    # Repeat the command in a temporary folder.
     names = recipe.find_inputs()
     beside = os.path.dirname(os.path.dirname(os.path.realpath(recipe.path))) if None in recipe.arguments else None
     folder = tempfile.mkdtemp(prefix=name_prefix(), dir=beside)
@@ -177,6 +178,7 @@ def rerun_command(
         with hush(), put_rows_first() if recipe.rows_first else nullcontext():
             words = recipe.make_command(names, folder) + ([] if count is None else ["--threads", str(count)])
             command.main(words[1:] + ["--quiet"] * quiet, prog_name=recipe.verb, standalone_mode=False, parent=context)
+        # Compare all new files with the recorded ones, and keep the requested one.
         made = os.path.join(folder, recipe.file or os.path.basename(output))
         for each in recipes:
             compare(each, os.path.join(folder, each.file) if each.file is not None else made)
@@ -253,6 +255,7 @@ def info_command(
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
         say(line)
+    # Print the metadata that images can have.
     notes = io.read_metadata(file)
     if notes.profile is not None:
         say(f"colours: ICC profile of {len(notes.profile)} bytes")
@@ -279,6 +282,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
     if not os.path.isfile(file):
         io.read(file)
     suffix = Path(file).suffix.lower()
+    # Formats that are not arrays are described by their own functions.
     if suffix in (".html", ".json") and recipe is not None:
         return [f"{'page' if suffix == '.html' else 'report'}: {os.path.getsize(file)} bytes"]
     if suffix == ".stl":
@@ -294,6 +298,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
                 continue
     if is_stack(file):
         return describe_material(file, "layer")
+    # Other files are images or volumes.
     made_by_solid = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
     volume = made_by_solid or (Path(file).suffix.lower() == ".npy" and holds_volume(file))
     try:

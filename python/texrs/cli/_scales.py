@@ -75,6 +75,7 @@ def scale_map_command(
     }
     if stages is not None:
         _outputs.check_stages(stages)
+    # Read the image, and check that the map can be written.
     pixels = read_picture(image)
     encoding = given["encoding"]
     levels: Any = encoding or ("log2" if Path(out).suffix.lower() not in FLOATS else None)
@@ -84,6 +85,7 @@ def scale_map_command(
     narrow = False
     names = {"image": image, "mask": mask or image, "known": str(hole), "steps": "--edit", "count": "--threads"}
     with name_arguments(**names), threads(count):
+        # Read, compute or measure the map.
         if scale_map is not None:
             made = read_scale_map(scale_map, encoding or "log2")
         elif given["slant"] is not None:
@@ -98,6 +100,7 @@ def scale_map_command(
                 drawn = check_same_size(read_mask(mask), pixels, "--mask")
             made = scale_maps.from_mask(drawn, known=known, **MASKS.call(MASKS.read(given)))
             shown["mask"] = drawn != 0
+        # Edit the map, and then resize it.
         shown["scale"] = scale_maps.picture(made)
         if ("steps",) in asked:
             made = scale_maps.edit(made, asked["steps",])

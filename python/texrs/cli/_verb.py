@@ -121,6 +121,7 @@ class Verb:
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
         read = _outputs.list_files(text for value in given.values() for text in _outputs.find_texts(value))
+        # Check the outputs of all variants.
         places = [paths]
         if variants is not None:
             seeds = range(given["seed"], given["seed"] + as_int(variants, "--variants", 1, 4096))
@@ -130,6 +131,7 @@ class Verb:
                 check_free(each["out"] or "")
         for each in places:
             _outputs.check_outputs(each)
+        # Read the example first, because the other inputs and the size depend on it.
         first = given[next(o.name for o in options if o.argument)]
         about = About(axes=options.axes, first=first if isinstance(first, str) else "", roles=stack.roles)
         with warnings.catch_warnings(record=True) as early:
@@ -163,6 +165,7 @@ class Verb:
             call = options.call({**self.knows(given), **values})
             if any(o.name == "size" and o.required for o in options):
                 call["size"] = size
+            # Compute and write one result, or each variant as soon as it is finished.
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
                 if self.keeps and like.georeference and made.image.shape[:2] != example.shape[:2]:

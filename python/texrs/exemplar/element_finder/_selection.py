@@ -86,6 +86,7 @@ def choose(contours: Contours) -> Choice | None:
 
 def choose_reading(contours: Contours, lines: str) -> Choice | None:
     """Return the best choice if lines of one kind are contours."""
+    # Merge the leaves, and keep candidates with a sufficient outline.
     strength, level = read_strength(contours, lines)
     leaves = make_leaves(strength, contours, 0.5 * level)
     total = strength.size
@@ -97,11 +98,13 @@ def choose_reading(contours: Contours, lines: str) -> Choice | None:
         return None
     candidates, base = candidates.pick(keep), base[keep]
     f = candidates.features
+    # Elements that the border of the image cuts are larger than their visible part.
     visible = np.clip(1 - 0.9 * f["frame"] / (f["length"] + f["frame"]), 0.3, 1)
     sizes = np.log(f["area"] / visible)
     best: tuple[float, NDArray[np.bool_], Values] | None = None
     seen: set[bytes] = set()
     for chosen, quality in choose_sizes(candidates, base, sizes, np.arange(np.log(least * 1.5), np.log(most), 0.35)):
+        # Repeat the consensus and the choice until a set occurs again.
         for _ in range(ROUNDS):
             if chosen.tobytes() in seen:
                 break
