@@ -124,7 +124,7 @@ def test_files_of_directions(tmp_path: Path, suffix: str) -> None:
         (lambda: fields.from_directions(np.full((4, 4, 2), np.nan)), "32 of 32 values are not"),
         (lambda: fields.from_directions(AROUND, along="z"), "along: must be one of y, x"),
         (lambda: fields.from_directions(AROUND, order="zyx"), "order: must be one of yx, xy"),
-        (lambda: fields.from_directions(WOUND, up=(0, 0, 0)), "up: must be 3 numbers"),
+        (lambda: fields.from_directions(WOUND, up=(0, 0, 0)), "up: must be one nonzero vector"),
         (lambda: fields.from_gradient(np.zeros(4)), "volume: must be numbers"),
         (lambda: fields.from_gradient(np.zeros((4, 4))), "all have length 0"),
         (lambda: fields.from_gradient(Z, across=True), "across: only available for images"),

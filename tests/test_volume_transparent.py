@@ -112,15 +112,15 @@ def test_transfer_functions() -> None:
     [
         ("0:own", "must be VALUE:COLOUR:ALPHA"),
         ("a:own:1", "must be VALUE:COLOUR:ALPHA"),
-        ("0:red:1", "must have a colour such as #cc3322"),
-        ("0:#12345:1", "must have a colour such as #cc3322"),
+        ("0:red:1", "a colour must be like #cc3322"),
+        ("0:#12345:1", "a colour must be like #cc3322"),
         ("0:own:2", "transfer"),
         ("2:own:1", "transfer"),
         ("0.5:own:0,0.2:own:1", "must have rising values, got 0.5, 0.2"),
         ([], "must be 1 to 256 stops"),
         ([0.5], r"must be \(value, colour, alpha\), got 0.5"),
         (7, "must be 1 to 256 stops"),
-        ([(0, (1, 2), 1)], "must have a colour"),
+        ([(0, (1, 2), 1)], "a colour must be like"),
         ([(0, (1, 2, 300), 1)], "transfer"),
     ],
 )

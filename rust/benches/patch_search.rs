@@ -27,7 +27,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             weight: &weight,
             shape: [patch; 2],
         };
-        // Several matches need repeated searches of the maps.
+        // Also time five matches, because each further match needs another search of the maps.
         for (count, threads) in [(1, 1), (1, 2), (5, 1)] {
             let pick = Pick {
                 count,

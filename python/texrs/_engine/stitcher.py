@@ -389,7 +389,7 @@ class Pasting:
 
 
 class Samples:
-    """Samples of one or several images as a list. Unwarped patches of them can be cut into a window.
+    """Samples of one or several images as a list. Unwarped patches of them are inserted along minimum cuts.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class Record:
     arguments: list[str | None]
     """Arguments of the command. None represents the output folder."""
     options: dict[str, Any]
-    """Options that are not the default: a text, a list of texts, or True."""
+    """Options that differ from their defaults. Each value is a string, a list of strings, or True."""
     seed: int | None
     files: dict[str, os.stat_result]
     """Input files, with their status at the start."""

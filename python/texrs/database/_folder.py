@@ -161,7 +161,7 @@ class Folder:
                     raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
                 time.sleep(PAUSE)
                 if not self._is_lock(number):
-                    # The process that had the lock removed its empty folder, so create the folder again.
+                    # The process that held the lock has removed its empty folder, so create the folder again.
                     os.close(number)
                     number = self._open_lock()
             yield

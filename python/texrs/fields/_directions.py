@@ -33,9 +33,9 @@ def from_directions(
 ) -> Field:
     """Return a field that turns one axis of the exemplar into given directions.
 
-    The other two axes of a volume are completed: one is as near to ``up`` as possible, and the last is perpendicular
-    to both. Lengths of vectors are ignored. A place without a direction gets the nearest direction. Where neighbours
-    point in opposite directions, as around a vortex, the nearest frame replaces the interpolated one.
+    The second axis of a volume is as near to ``up`` as possible, and the third is perpendicular to both.
+    Lengths of vectors are ignored. A place without a direction gets the nearest direction. Where neighbours point in
+    opposite directions, as around a vortex, the nearest frame replaces the interpolated one.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
         upwards = np.asarray(up, np.float64)
         if upwards.shape not in ((3,), unit.shape) or not np.isfinite(upwards).all() or not upwards.any(axis=-1).all():
             raise InvalidInput(
-                f"up: must be 3 numbers that are not all 0, or such numbers for each of {unit.shape[:-1]}, got {up!r}"
+                f"up: must be one nonzero vector of shape (3,), or nonzero vectors of shape {unit.shape}, got {up!r}"
             )
         upwards = upwards.reshape(-1, 3) / np.sqrt((upwards.reshape(-1, 3) ** 2).sum(axis=1, keepdims=True))
     # If a direction is parallel to up, use the axis least parallel to it instead.

@@ -476,7 +476,7 @@ def guide_materials(materials: Sequence[Material]) -> list[Array]:
     check_alike(materials)
     first = materials[0]
     if len(first) == 1:
-        # With a single map, verbs decide from that map itself.
+        # A single map is its own guide image.
         return [np.asarray(next(iter(m.values())).pixels) for m in materials]
     # Use 16 bits, which need half the memory of floats and give the same values on every processor.
     return [

@@ -47,7 +47,8 @@ def from_mask(
     """Measure a scale map from a mask of features: the denser the features, the smaller the elements.
 
     If elements appear twice as large, a window contains half the length of outlines. Equation 1 of [1]_ counts the
-    pixels of the mask instead, and has the relation reversed. The measured logarithms are smoothed (equation 2).
+    pixels of the mask instead, and has the relation reversed. The logarithms of the measured scales are
+    smoothed (equation 2).
 
     Parameters
     ----------
@@ -55,9 +56,9 @@ def from_mask(
         Mask of the features, (H, W), from `auto_mask` or drawn by hand.
     measure : {"boundary", "skeleton", "count", "area"}
         Quantity to measure. ``"boundary"``: the length of the outlines. Features and gaps may be swapped.
-        ``"skeleton"``: the length of the features' centre lines, if they are curves. ``"count"``: the number of
-        features, if the mask is clean and elements do not touch. ``"area"``: the number of mask pixels in windows of
-        32 pixels, by the equations of the paper as printed. This is only useful for drawn curves, and gives their
+        ``"skeleton"``: the length of the features' centre lines, for features that are curves. ``"count"``: the number
+        of features, if the mask is clean and elements do not touch. ``"area"``: the number of mask pixels in windows
+        of 32 pixels, by the equations of the paper as printed. This is only useful for drawn curves, and gives their
         reciprocal scale. For areas, the covered share of a window does not depend on their size. Default: "boundary".
     window : int, optional
         Side of the windows in pixels, at least 16. Default: eight times the spacing of the features, at most a third

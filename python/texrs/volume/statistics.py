@@ -180,8 +180,8 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
     image : (H, W[, C]) or (D, H, W[, C]) array_like
         Image or volume, with or without channels.
     axes : int, optional
-        Number of spatial axes, 2 or 3. The last of three axes contains channels if it has up to 4 entries. Default:
-        from the shape.
+        Number of spatial axes, 2 or 3. Default: from the shape. An array of three axes is an image with channels if its
+        last axis has at most 4 entries, and otherwise a volume.
 
     Returns
     -------

@@ -174,7 +174,9 @@ def _as_colour(colour: object) -> tuple[float, float, float]:
     if isinstance(colour, Sequence | np.ndarray) and not isinstance(colour, str) and len(colour) == 3:
         red, green, blue = (as_float(c, "transfer", 0, 255) / 255 for c in colour)
         return red, green, blue
-    raise InvalidInput(f"transfer: must have a colour such as #cc3322, three numbers, or own; got {colour!r}")
+    raise InvalidInput(
+        f"transfer: a colour must be like #cc3322, three numbers, or own for the colour of the voxel; got {colour!r}"
+    )
 
 
 def _classify(voxels: NDArray[np.generic], stops: NDArray[np.float64] | None) -> Floats:

@@ -132,7 +132,7 @@ def mark_removed(extension: Extension, assigned: NDArray[np.intp], grown: int = 
     used[assigned + 1] = True
     moved = used.take(extension.instance)
     idle = (extension.instance > 0) & ~moved
-    # In an edit, only removed elements are erased with the pixels around them.
+    # In an edit, stray pixels are erased without the pixels around them.
     gone = idle if extension.originals else idle | extension.stray
     wide = maximum_filter(gone.view(np.uint8), 2 * grown + 1).view(bool) if grown else gone
     return np.asarray((wide | extension.stray) & ~moved)

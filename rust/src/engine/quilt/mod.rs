@@ -65,7 +65,7 @@ pub struct Options {
     pub size: [usize; 2],
     /// True for each periodic axis.
     pub wrap: [bool; 2],
-    /// Rows and columns of all patches.
+    /// Rows and columns of each patch.
     pub patch: [usize; 2],
     /// If true, the images repeat on a lattice.
     pub regular: bool,

@@ -211,7 +211,7 @@ impl<const D: usize> Chart<D> {
         let Frames::Dense(all) = frames else {
             return None;
         };
-        // Integrate each exemplar axis on a coarse lattice, then interpolate it at the points.
+        // Integrate the frames on a coarse lattice, once for each exemplar axis, and interpolate.
         let mesh = Mesh::new(&window, all);
         let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
         let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };

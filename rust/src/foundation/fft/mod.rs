@@ -1,8 +1,8 @@
 //! Fourier transforms of lines of complex numbers and of real images and volumes. Only this folder
 //! names the FFT crate.
 //!
-//! Transforms are not normalised: a forward and an inverse transform multiply by the number of
-//! points. Two real lines are transformed together as one complex line (Press et al., *Numerical
+//! Transforms are not normalised. A forward transform followed by an inverse transform multiplies
+//! the values by the number of points. Two real lines are transformed together as one complex line (Press et al., *Numerical
 //! Recipes*, 12.3).
 
 mod lanes;

@@ -188,7 +188,8 @@ impl Prepared {
 
     /// Returns the cost of a position, or infinity as soon as it is known to exceed `bound`.
     ///
-    /// The result depends on the lanes, their order and the absence of fused operations.
+    /// All implementations must sum in the same lanes and order, without fused operations, so that
+    /// their results are equal.
     pub(super) fn cost_within(
         &self,
         data: &[f32],

@@ -158,7 +158,7 @@ fn of_equal_seams_the_innermost() {
     assert_eq!(inside.iter().filter(|&&i| i).count(), 1);
 }
 
-/// Larger costs, whose sums would not fit, are left to another solver.
+/// Costs whose sums would overflow are left to another solver.
 #[test]
 fn refuses_what_would_overflow() {
     let sides = [
