@@ -98,8 +98,8 @@ def test_measures_know_the_best_and_the_worst() -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"pictures": {}}, "pictures: must contain at least one"),
-        ({"tasks": []}, "tasks: must contain at least one"),
+        ({"pictures": {}}, "pictures: must have at least one"),
+        ({"tasks": []}, "tasks: must have at least one"),
         ({"tasks": ["all"]}, "tasks"),
         ({"side": 8}, "side"),
         ({"side": 96, "size": 64}, "size"),
