@@ -80,7 +80,7 @@ class Constraints:
         """Raise an error unless exactly one of values and coordinates is given."""
         if (self.values is None) == (self.coordinates is None):
             raise InvalidInput(
-                "constraints: must have either values or coordinates, not both, for the points that mask marks"
+                "constraints: must have either values or coordinates of the points that mask marks, not both"
             )
 
 
