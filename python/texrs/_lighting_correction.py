@@ -116,7 +116,7 @@ def flatten_lighting(
 def measure_unevenness(image: Array, space: Space | None = None) -> float:
     """Return the brightness of the best lit part of an image divided by that of the worst lit part.
 
-    The result is 1 if there is no evidence of uneven light.
+    The result is 1 without evidence of uneven light.
     """
     pixels = as_image(image, "image")
     step = max(1, max(pixels.shape[:2]) // LOOKED_AT)

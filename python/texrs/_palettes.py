@@ -33,11 +33,11 @@ MOST = 64
 Few photographs have so few grey levels.
 """
 SPARE = 8
-"""Minimum number of pixels per colour. In a small crop of a photograph, almost every pixel has its own colour."""
+"""Minimum number of pixels per colour. Almost every pixel has its own colour in a small crop of a photograph."""
 STEP, SHARE = 8, 0.75
 """Minimum difference of adjacent pixels, of 255 levels, and minimum fraction of unequal pairs that reach it.
 
-In smooth images, adjacent pixels differ by 1 or 2 levels.
+Adjacent pixels of smooth images differ by 1 or 2 levels.
 """
 ENOUGH = 2**18
 """Approximate number of pixels whose neighbours are compared, in rows and columns spread over the image."""

@@ -39,7 +39,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     if pixels.ndim not in (axes, axes + 1) or pixels.dtype.kind not in "buif" or not pixels.size:
         as_image(pixels, "image", axes=axes)
     marks, shape = mask.marks, pixels.shape[:axes]
-    alpha, worded = _is_alpha(marks), _is_value(marks)
+    alpha, worded = _is_alpha(marks), is_value(marks)
     if worded and mask.threshold is not None:
         raise InvalidInput("threshold: must be given with a mask that is an image, or with 'alpha'")
     if alpha:
@@ -56,7 +56,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
 def check_material(given: dict[str, Any]) -> None:
     """Refuse a hole that is defined by the values of one image if there are several maps."""
     marks = as_marks(given.get("mask")).marks
-    if _is_alpha(marks) or _is_value(marks):
+    if _is_alpha(marks) or is_value(marks):
         raise InvalidInput(
             "mask: must be a mask, because the image is a material, and one hole applies to all its maps"
         )
@@ -66,7 +66,7 @@ def _is_alpha(marks: object) -> bool:
     return isinstance(marks, str) and marks == "alpha"
 
 
-def _is_value(marks: object) -> bool:
+def is_value(marks: object) -> bool:
     """Return whether marks refer to values of the image: "nan", "nodata", a number, or None for pixels without a value."""
     if isinstance(marks, str):
         return marks in ("nan", "nodata")

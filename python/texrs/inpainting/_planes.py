@@ -1,7 +1,7 @@
 """Fill holes in images of several planes. Each plane is filled from its own visible pixels, in its own perspective.
 
-Parts outside the planes, such as the sky above a floor, continue behind the planes. Two planes that meet in a hole are both
-filled a little beyond their visible part, and cut at the line where they meet (`texrs.inpainting._sides`).
+Parts outside the planes, such as the sky above a floor, continue behind the planes. Two planes that meet in a hole are
+both filled a little beyond their visible part, and cut at the line where they meet (`texrs.inpainting._sides`).
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ MOSTLY = 0.8
 ALIKE = 0.15
 """Largest difference of the mean colours, 0 to 1, of regions of one part, such as the sky on both sides of a tower."""
 BAND, NARROWEST, WIDEST = 0.4, 16, 64
-"""Width of the band by which a plane is filled beyond its visible part, where it meets another.
+"""Width of the band that extends a plane beyond its visible part, if it meets another plane.
 
-In square roots of its area, with the minimum and the maximum in pixels.
+The unit is the square root of its area. The minimum and the maximum are in pixels.
 """
 
 

@@ -32,7 +32,7 @@ class Scene:
     wrap: tuple[bool, bool]
     """Axes along which the image is periodic."""
     _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)
-    """Index of each set of mirror images, for all sizes of patches."""
+    """Index of each set of mirror images. It serves all sizes of patches."""
 
     @property
     def itself(self) -> bool:

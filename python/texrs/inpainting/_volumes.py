@@ -24,7 +24,7 @@ from texrs._typing import Array, Bools, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.growth.start import OVERLAP, weights_of
-from texrs.inpainting._holes import find_hole
+from texrs.inpainting._holes import find_hole, is_value
 from texrs.io._grids import holds_volume
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -73,8 +73,7 @@ def is_volume(image: object, hole: object) -> bool:
     sides: tuple[int, ...] = getattr(image, "shape", ())
     # An image with few channels stays an image, whatever its hole.
     deep = len(sides) == 4 or (len(sides) == 3 and sides[2] > MOST_CHANNELS)
-    named = isinstance(marks, str) and marks in ("nan", "nodata")
-    if marks is None or named or isinstance(marks, int | float):
+    if is_value(marks):
         if isinstance(image, str | os.PathLike):
             return os.path.exists(image) and holds_volume(image)
         if deep:

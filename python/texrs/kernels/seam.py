@@ -63,7 +63,7 @@ class OldSeams:
     Attributes
     ----------
     kept : sequence of array_like
-        Cost ``M(p, q, S, T)``, at least 0, if both pixels keep A. Use 0 if there is no old seam. The pair then has its
+        Cost ``M(p, q, S, T)``, at least 0, if both pixels keep A. Use 0 without an old seam. The pair then has its
         ordinary cost.
     ab : sequence of array_like
         Cost ``M(p, q, S, B)``, at least 0, if ``p`` keeps A and ``q`` takes B.
