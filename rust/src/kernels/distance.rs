@@ -26,9 +26,9 @@ pub struct Piece {
 /// exactly.
 const MOST: usize = 1 << 20;
 
-/// Returns the signed distances of each piece's window: from each pixel to the nearest pixel across
-/// the outline, in pixels. Distances are negative outside the piece. The result is `None` if the
-/// window contains only one side.
+/// Returns the signed distances of each piece's window: from each pixel to the nearest pixel across the outline, in
+/// pixels. Distances are negative outside the piece. The result is `None` if all pixels of the window are on the same
+/// side of the outline.
 ///
 /// # Errors
 /// The size of the label image does not match its shape, a window is empty or too large, or the monitor was cancelled.
@@ -70,7 +70,7 @@ pub fn outlines(
     .collect()
 }
 
-/// Returns the flags of the window pixels that belong to the piece.
+/// Returns a flag for each pixel of the window: true if the pixel belongs to the piece.
 fn cut_out(labels: &[i32], shape: [usize; 2], piece: &Piece) -> Vec<bool> {
     let bring = |axis: usize, i: usize| {
         let at = piece.low[axis].saturating_add(i as i64);

@@ -13,7 +13,7 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Number of output pixels of a task. A call with at most this many pixels needs no thread pool.
+/// Number of output pixels in each parallel task. A call with at most this many pixels needs no thread pool.
 pub const CHUNK: usize = 4096;
 
 /// Interpolation between samples.
@@ -45,8 +45,8 @@ macro_rules! integer_elements {
         impl Element for $t {
             fn to_f64(self) -> f64 { f64::from(self) }
             fn from_f64(value: f64) -> Self {
-                // A cast rounds towards zero, so correct it for negative values. `f64::floor` would
-                // be a function call on CPUs that may lack the instruction.
+                // A cast rounds towards zero, so correct it for negative values. `f64::floor` would be a function call
+                // unless the compiler's target is known to have a rounding instruction.
                 let above = value + 0.5;
                 let cast = above as $t;
                 if f64::from(cast) > above { cast.saturating_sub(1) } else { cast }

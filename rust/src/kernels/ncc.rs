@@ -32,7 +32,7 @@ pub struct Correlation {
 
 struct Channel {
     spectrum: Vec<Complex<f64>>,
-    /// Sums of values and of squares above and left of each corner.
+    /// Sums of the values, and of their squares, above and to the left of each pixel corner.
     sums: Vec<[f64; 2]>,
     variance: f64,
 }
@@ -173,8 +173,8 @@ fn mean(values: &[f32]) -> f64 {
     values.iter().map(|&x| f64::from(x)).sum::<f64>() / values.len() as f64
 }
 
-/// Returns sums over all values above and left of each corner: one row and one column more than the
-/// values.
+/// Returns the sums of values and of squares above and to the left of each pixel corner. The result has one row and
+/// one column more than the values.
 fn running(values: &[f64], shape: [usize; 2]) -> Vec<[f64; 2]> {
     let width = shape[1] + 1;
     let mut sums = vec![[0.0; 2]; (shape[0] + 1) * width];
@@ -205,7 +205,7 @@ fn spectrum(
     spectrum
 }
 
-/// Returns the next even length whose prime factors are 2, 3 and 5.
+/// Returns the smallest even length of at least `n` that has no prime factors other than 2, 3 and 5.
 fn quick(n: usize) -> usize {
     let mut length = n.next_multiple_of(2);
     loop {

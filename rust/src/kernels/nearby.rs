@@ -1,8 +1,8 @@
-//! Windowed sums of values that are given at a few points of an image, under a separable window,
-//! without a pass over the whole image.
+//! Weighted sums of the values around points of an image, under a separable window. Only a few points have values, so
+//! the image is not convolved as a whole.
 //!
-//! Each point adds its value to the pixels above and below it, and then sums the pixels left and
-//! right of it. Sums run in `f64`, the farthest values first.
+//! Each point first adds its weighted value to the pixels above and below it, and then sums the pixels to its left and
+//! right. Sums run in `f64`: first the value at distance 0, then the values from the farthest to the nearest.
 
 use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
@@ -10,12 +10,12 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Number of points of a task.
+/// Number of points in each parallel task.
 const CHUNK: usize = 4096;
 
-/// Returns the weighted sum of the values of all points at each point (row, column). The weight of a value is the
-/// product of `window[k]` for the distance k in rows and the same for columns. Distances beyond the window have weight
-/// 0.
+/// Returns the weighted sum of the values of all points around each point (row, column). The weight of a value is
+/// `window[a] * window[b]`, with its distances a in rows and b in columns. Distances of `window.len()` or more have
+/// weight 0.
 ///
 /// # Errors
 /// `points` and `values` differ in number, a point is outside the image, the number of pixels
@@ -37,7 +37,7 @@ pub fn sums(
             format!("must all be inside an image of shape {shape:?}"),
         ));
     }
-    // Pixels beyond an edge are on the other side if the image wraps, else in an empty margin.
+    // Pixels beyond an edge are on the other side if the image wraps. Otherwise they are in an empty margin.
     let reach = window.len().saturating_sub(1);
     let margin = if cyclic { 0 } else { reach };
     let [height, width] = image.shape().map(|n| n + 2 * margin);
@@ -63,7 +63,7 @@ pub fn sums(
     par::chunks_mut(&mut found, CHUNK, |chunk, sums| {
         for (sum, &[row, column]) in sums.iter_mut().zip(&points[chunk * CHUNK..]) {
             let line = around(row, 0, height) * width;
-            // Round to the precision of the summed values.
+            // Round to single precision between the axes, as `kernels::smooth` does.
             let look = |step| f64::from(added[line + around(column, step, width)] as f32);
             let beside = |far: usize| (look(-(far as i64)) + look(far as i64)) * window[far];
             *sum = (1..=reach)
@@ -74,8 +74,8 @@ pub fn sums(
     Ok(found)
 }
 
-/// Returns distances and steps: zero first, then from the farthest to the nearest in both
-/// directions.
+/// Returns each distance with its signed step: zero first, then both directions, from the farthest distance to the
+/// nearest.
 fn steps(reach: usize) -> impl Iterator<Item = (usize, i64)> {
     let both = |far: usize| [(far, -(far as i64)), (far, far as i64)];
     std::iter::once((0, 0)).chain((1..=reach).rev().flat_map(both))
@@ -96,7 +96,7 @@ mod tests {
             let points: Vec<_> = (0..rows * columns).filter(|&i| marks[i] > 0).map(at).collect();
             let values: Vec<f32> = (0..points.len()).map(|k| k as f32 - 3.0).collect();
             let got = sums(&points, &values, [rows, columns], cyclic, &window, &Monitor::default()).unwrap();
-            // A small image is counted as often as the window wraps around it.
+            // If the image is smaller than the window, a point counts several times because the window wraps around.
             let weight = |a: i64, b: i64, n: usize| -> f64 {
                 let turns = if cyclic { -3..=3 } else { 0..=0 };
                 let far = turns.map(|turn| (a - b + turn * n as i64).unsigned_abs() as usize);

@@ -98,7 +98,7 @@ fn most(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }
 
-/// Propagates values from a row into the next one, and along the next one in both directions.
+/// Propagates the values of a row into the adjacent row `here`, and then along `here` in both directions.
 fn carry(before: Option<&[f32]>, here: &mut [f32], mask: &[f32]) {
     if let Some(before) = before {
         lower(before, here, mask);
@@ -134,7 +134,7 @@ wide_fn! {
     }
 }
 
-/// The neighbours of pixels.
+/// The eight neighbours of each pixel.
 struct Around<'a> {
     grid: &'a Grid<2>,
     steps: [isize; 8],

@@ -10,9 +10,9 @@ use crate::foundation::par::{self, Monitor};
 use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
 
-/// Number of sums that are computed together.
+/// Number of adjacent sums that are computed together.
 const LANES: usize = 16;
-/// Number of rows of a task.
+/// Number of rows in each parallel task.
 const ROWS: usize = 64;
 
 /// Values beyond the ends of an axis.
@@ -22,7 +22,7 @@ pub enum Edge {
     Reflect,
     /// The last value.
     Nearest,
-    /// The array from its other end.
+    /// The array continues from its other end.
     Wrap,
     /// Zero.
     Zero,
@@ -132,7 +132,7 @@ fn pass<T: Number>(
     let what = "the smoothed array";
     let reach = axis.weights.len() - 1;
     let length = memory::product("weights", &[2, reach])?.saturating_add(count);
-    // Memory of the tasks on all threads.
+    // Check that the buffers of all threads fit into memory.
     memory::room(what, length.saturating_mul(LANES), 8 * par::threads())?;
     // Find the source of each value of the extended axis once.
     let mut source: Vec<u32> = memory::filled(what, u32::MAX, length)?;
@@ -202,7 +202,8 @@ fn pass<T: Number>(
 }
 
 wide_fn! {
-    /// Returns sums that start at a place, of values that are `apart` in memory.
+    /// Returns the weighted sums of `LANES` adjacent positions, starting at `first`. Neighbours along the smoothed
+    /// axis are `apart` values apart in memory.
     fn sum(values: &[f64], first: usize, apart: usize, weights: &[f64]) -> [f64; LANES] {
         let reach = weights.len() - 1;
         let mut sums = [0.0; LANES];

@@ -1,12 +1,14 @@
-//! Image files in memory: PNG, TIFF and Radiance HDR with 8-bit, 16-bit and float samples, and with limits.
+//! Image files in memory: PNG, TIFF and Radiance HDR with 8-bit, 16-bit and float samples.
 //!
 //! Python's libraries read and write the other formats. They do not support HDR, or PNG and LZW-compressed TIFF with
 //! 16 bits and several channels. Only this module uses the image crate. Samples are bytes in native order, so one path
 //! handles every sample type without conversions. Three measures make hostile files harmless:
 //!
-//! 1. The header's pixels and bytes are compared with the limit before anything is decoded.
-//! 2. The output is reserved with an allocation that may fail, instead of one that ends the process.
-//! 3. A panic of a decoder is caught. Its message is not printed, because the error contains it.
+//! 1. The numbers of pixels and bytes that follow from the header are compared with the limit before anything is
+//!    decoded.
+//! 2. Memory for the output is reserved by an allocation that can return an error, instead of one that ends the
+//!    process.
+//! 3. A panic of a decoder is caught and becomes an error. Its message is not printed.
 
 use std::cell::Cell;
 use std::io::Cursor;
@@ -202,7 +204,8 @@ fn rgbe(name: &str, metadata: &hdr::HdrMetadata) -> Result<()> {
     }
 }
 
-/// Returns the image crate's name for a combination that the format restores exactly.
+/// Returns the image crate's colour type for a sample type and number of channels, or `None` if the format does not
+/// support this combination.
 fn color(format: Format, sample: Sample, channels: usize) -> Option<ExtendedColorType> {
     use ExtendedColorType as C;
     match (format, sample, channels) {

@@ -1,10 +1,9 @@
 //! Choice of the matches that are cut into a window. Matches that would repeat or mirror their
 //! neighbourhood cost more.
 //!
-//! A greedy choice prefers what it has just pasted and the mirror image of its neighbourhood. Both
-//! fit well, and both are visible. So the cost of a match is increased by the share of it that the
-//! neighbourhood already shows, elsewhere or mirrored. A perfect match has cost 0 and stays at 0,
-//! because a regular texture may repeat.
+//! A greedy choice tends to repeat recent patches or to mirror its neighbourhood, because both fit well. Both are easy
+//! to see. The cost of a match therefore grows with the share of it that the neighbourhood already contains, at
+//! another offset or mirrored. A perfect match keeps its cost of 0, because a regular texture may repeat.
 
 use super::window::Window;
 use super::{Options, Patch};
@@ -14,10 +13,10 @@ use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Pick};
 use crate::{Error, Result};
 
-/// Distance, in patches, up to which a repetition is charged.
+/// Distance, in patch sides, up to which a repetition is charged.
 const REACH: usize = 2;
-/// A copy whose offset from an earlier patch is at most this number of pixels continues that patch.
-/// With a larger offset it is a repetition.
+/// Maximum difference, in pixels, between the positions of a match and of the continuation of an earlier patch. A
+/// match with a larger difference is a repetition.
 const STRETCH: isize = 2;
 /// Charge, relative to the cost of a match, if its whole area is repeated.
 const REPEATED: f64 = 1.0;
@@ -81,8 +80,8 @@ impl<'a> Chooser<'a> {
         Ok(found)
     }
 
-    /// Returns the charge for the share of a match that its neighbourhood already shows, elsewhere
-    /// or mirrored.
+    /// Returns the charge for the share of a match that its neighbourhood already contains, at another offset or
+    /// mirrored.
     fn charge(&self, found: &Match, to: [usize; 2], pasted: &[Patch]) -> f64 {
         let patch = self.options.patch;
         let (of, flip) = self.turned[found.exemplar];
@@ -114,7 +113,8 @@ impl<'a> Chooser<'a> {
         charge
     }
 
-    /// Returns the corner of a patch in the exemplar whose mirror image the given exemplar is.
+    /// Returns the corner of a patch in the original exemplar. `at` is its corner in `exemplar`, which may be a mirror
+    /// image.
     fn unturned(&self, exemplar: usize, at: [usize; 2]) -> [isize; 2] {
         let shape = self.index.exemplars()[exemplar].shape;
         let flip = self.turned[exemplar].1;

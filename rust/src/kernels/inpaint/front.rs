@@ -8,21 +8,21 @@ use crate::foundation::grid::Grid;
 
 /// Side of a block of the canvas, in pixels.
 const BLOCK: usize = 32;
-/// Value for a block without holes.
+/// Entry of a block without unknown pixels.
 const NONE: (u32, usize) = (u32::MAX, usize::MAX);
 
-/// Number of unknown pixels in each window of the canvas, and the holes with the most known pixels
-/// around them.
+/// Number of unknown pixels in each window of the canvas, and the unknown pixels with the most known pixels around
+/// them.
 pub(super) struct Front {
     grid: Grid<2>,
     patch: [usize; 2],
-    /// Number of unknown pixels of the window at each corner.
+    /// Number of unknown pixels in the window whose top-left corner is at each pixel.
     unknown: Vec<u32>,
     /// First row, or column, of the window that is centred on each row, or column.
     centred: [Vec<usize>; 2],
-    /// Best hole of each block of the canvas, as (unknown pixels, hole). It has the fewest unknown pixels in its
-    /// window. Ties go to the first hole in scan order. A step changes only a few blocks, which are then searched
-    /// again.
+    /// Best unknown pixel of each block of the canvas, as (number of unknown pixels in the window centred on it,
+    /// index). The best pixel has the smallest number. Ties go to the first pixel in scan order. A step changes only a
+    /// few blocks, which are then searched again.
     best: Vec<(u32, usize)>,
 }
 
@@ -56,13 +56,13 @@ impl Front {
         front
     }
 
-    /// Returns the hole with the most known pixels around it.
+    /// Returns the unknown pixel with the most known pixels around it.
     pub(super) fn next(&self) -> Option<usize> {
         let best = self.best.iter().min()?;
         (*best != NONE).then_some(best.1)
     }
 
-    /// Number of unknown pixels of the window at a corner.
+    /// Number of unknown pixels in the window with this top-left corner.
     pub(super) fn unknown(&self, to: [usize; 2]) -> usize {
         self.unknown[self.grid.index(to)] as usize
     }
@@ -71,7 +71,7 @@ impl Front {
     pub(super) fn filled(&mut self, to: [usize; 2], known: &[bool]) {
         let last = std::array::from_fn(|axis| to[axis] + self.patch[axis] - 1);
         self.recount(to, last, known);
-        // Windows that overlap this one belong to holes at most one window away.
+        // The best pixels can change up to one window away, because windows centred there overlap this window.
         let grid = self.grid;
         let before: [usize; 2] = std::array::from_fn(|axis| self.patch[axis]);
         let after = std::array::from_fn(|axis| to[axis] + 2 * self.patch[axis] - 1);
@@ -79,13 +79,13 @@ impl Front {
         self.look(start, extent, known);
     }
 
-    /// Returns the corner of a window that contains a hole at the fraction `share` of its sides,
-    /// clamped to the canvas.
+    /// Returns the corner of a window that contains the pixel `hole` at the fraction `share` of its sides, clamped to
+    /// the canvas.
     pub(super) fn corner(&self, hole: [usize; 2], share: [f64; 2]) -> [usize; 2] {
         corner(&self.grid, self.patch, hole, share)
     }
 
-    /// Updates the best holes of the blocks in a rectangle.
+    /// Updates the best unknown pixels of the blocks in a rectangle.
     fn look(&mut self, start: [usize; 2], extent: [usize; 2], known: &[bool]) {
         let [height, width] = self.grid.shape();
         let across = width.div_ceil(BLOCK);

@@ -4,17 +4,17 @@
 //! IEEE TIP 2004). Patches are pasted by the graph cuts of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003). Shen et
 //! al. 2006, section 3.4, combined both:
 //!
-//! 1. take the hole with the most known pixels around it, and the window over it whose known fraction is nearest to
-//!    0.6;
+//! 1. take the unknown pixel with the most known pixels around it, and the window over it whose known fraction is
+//!    nearest to 0.6;
 //! 2. find good matches of the known pixels in the window, with the largest weights near the hole;
-//! 3. drop matches that would repeat or mirror their neighbourhood, and keep the remaining match with the cheapest cut
-//!    into the known pixels;
+//! 3. increase the cost of matches that would repeat or mirror their neighbourhood, and choose the match with the
+//!    cheapest cut into the known pixels;
 //! 4. paste this match, and repeat until no hole is left.
 //!
-//! The literal method visits holes in scan order, centres the window on the hole and takes the best match at once. Its
-//! last patches must fit known pixels on several sides, which tears large elements. In the order from the rim inwards,
-//! patches meet other patches, and a cut may run between them. Trying several windows and judging matches by their
-//! actual cuts leaves fewer visible seams.
+//! The literal method visits unknown pixels in scan order, centres the window on the pixel and takes the best match at
+//! once. Its last patches must fit known pixels on several sides, which tears large elements. In the order from the
+//! rim inwards, patches meet other patches, and a cut may run between them. Trying several windows and judging matches
+//! by their actual cuts leaves fewer visible seams.
 
 mod choose;
 mod front;
@@ -33,16 +33,17 @@ use choose::Chooser;
 use front::{Front, corner};
 use window::Window;
 
-/// Positions of the hole in the tried windows, as fractions of the side.
+/// Positions of the unknown pixel in the windows that are tried, as fractions of the window's side.
 const ANCHORS: [f64; 5] = [0.25, 0.4, 0.5, 0.6, 0.75];
 /// Preferred fraction of known pixels in a window.
 const KNOWN_SHARE: f64 = 0.6;
 /// Weight of a known pixel far from the hole. Next to the hole the weight is larger by 1.
 const FAR_WEIGHT: f32 = 0.05;
-/// Weight factor of a pixel next to the hole that must stay, because a cut cannot move away from
-/// it. The weight falls off at half the distance.
+/// Weight of a pixel that must stay and is next to the hole. It is large because a cut cannot move away from such a
+/// pixel. It falls off at half the distance of other weights.
 const KEPT_WEIGHT: f32 = 10.0;
-/// Half of the constant that cuts add to the gradients in their denominators.
+/// Constant that is added to the gradient in the cost of a seam along pixels that must stay. It is half the constant
+/// that cuts add to the sum of two gradients.
 const FLAT: f32 = 0.025;
 
 /// Parameters of the filling.
@@ -50,17 +51,17 @@ const FLAT: f32 = 0.025;
 pub struct Options {
     /// Rows and columns of a patch.
     pub patch: [usize; 2],
-    /// Choice of the matches that are considered. The literal method cuts in all of them, the default method the three
-    /// most promising.
+    /// Choice of the matches that are considered. The literal method tries the cut of each of them, the default method
+    /// only of the three most promising.
     pub pick: Pick,
     /// Seed for the patches of windows without known pixels.
     pub seed: u64,
-    /// If true, use the method of Shen et al. (2006) as printed. It has scan order, windows centred
-    /// on the hole and equal weights of all known pixels. It takes the exact best matches, and the
-    /// cost of a cut is the plain difference.
+    /// If true, use the method of Shen et al. (2006) as printed: scan order, windows centred on the unknown pixel, and
+    /// equal weights of all known pixels. It takes the exact best matches, and the cost of a cut is the plain
+    /// difference.
     pub paper: bool,
-    /// Index of the exemplar that equals the known part of the canvas, if there is one. The
-    /// surroundings of a hole are then not repeated in it.
+    /// Index of the exemplar that equals the known part of the canvas, if there is one. Matches that repeat the
+    /// surroundings of a hole then cost more.
     pub shown: Option<usize>,
 }
 
@@ -161,7 +162,7 @@ pub fn inpaint(
         );
         return Err(Error::value("shown", message));
     }
-    // Prepare the search, the stitchers and the order of holes.
+    // Prepare the search, the stitchers and the order of the unknown pixels.
     let mut result = Inpainting {
         label: vec![-1; canvas.grid.len()],
         patches: Vec::new(),
@@ -219,7 +220,7 @@ pub fn inpaint(
     Ok(result)
 }
 
-/// Order of the holes.
+/// Order of visiting the unknown pixels.
 enum Order {
     /// Row by row, starting at this pixel.
     Scan(usize),
@@ -242,8 +243,8 @@ impl Order {
             Self::Inwards(front) => {
                 let hole = canvas.grid.point(front.next()?);
                 let pixels = (patch[0] * patch[1]) as f64;
-                // Try windows that contain the hole at several positions, and take the one whose
-                // fraction of known pixels is best.
+                // Try windows that contain the pixel at several positions, and take the window whose known fraction is
+                // nearest to the preferred fraction.
                 let mut best = (f64::INFINITY, [0, 0]);
                 for down in ANCHORS {
                     for across in ANCHORS {

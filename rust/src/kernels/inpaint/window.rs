@@ -50,7 +50,7 @@ pub(super) struct Window {
     weight: Vec<f32>,
     /// Pixels that a cut must not change.
     core: Vec<bool>,
-    /// Pairs of neighbours: a pixel that must stay, and a hole.
+    /// Pairs of neighbours: a pixel that must stay, and an unknown pixel.
     ends: Vec<[usize; 2]>,
 }
 
@@ -151,9 +151,9 @@ impl Window {
         Ok(cut.map(|cut| (cut.value + border, cut.b)))
     }
 
-    /// Marks the pixels that a cut must not change: pixels to keep, and the known rim of the
-    /// window, which is connected to the canvas. The rim is free at the edges of the canvas and
-    /// next to the hole.
+    /// Marks the pixels that a cut must not change: pixels to keep, and known pixels along the window's border. The
+    /// border then still fits the canvas outside the window. Pixels at an edge of the canvas or next to an unknown
+    /// pixel do not count as border.
     fn tie(&mut self, canvas: &Canvas<'_>, to: [usize; 2]) {
         let [rows, columns] = self.shape;
         let [height, width] = canvas.grid.shape();
@@ -171,12 +171,12 @@ impl Window {
                 || (c > 0 && !known[r * columns + c - 1])
                 || (c + 1 < columns && !known[r * columns + c + 1])
         };
-        // The core: pixels to keep, and the known rim.
+        // The core consists of the pixels to keep and of the known border.
         for (i, core) in self.core.iter_mut().enumerate() {
             let (r, c) = (i / columns, i % columns);
             *core = self.keep[i] || (known[i] && rim(r, c) && !hole_beside(r, c));
         }
-        // The pairs of pixels to keep and holes, which are outside every overlap.
+        // List the pairs of a pixel to keep and an unknown pixel, because no overlap contains both.
         self.ends.clear();
         for i in 0..rows * columns {
             let beside = [
@@ -193,9 +193,9 @@ impl Window {
         }
     }
 
-    /// Returns the cost of the seam between pixels to keep and the hole, which is outside every
-    /// overlap. No pixels are known beyond the seam. The difference is therefore assumed to be
-    /// equal on both sides, and the gradient is that of the new patch.
+    /// Returns the cost of the seam between pixels to keep and unknown pixels, which no overlap contains. The old
+    /// colours beyond the seam are unknown. The difference is therefore assumed to be equal on both sides, and the
+    /// gradient is that of the new patch.
     fn border(&self, new: &[f32]) -> f64 {
         let n = self.channels;
         let apart = |a: &[f32], i: usize, b: &[f32], j: usize| -> f32 {

@@ -5,8 +5,8 @@
 //! colour units. Departure from the paper: positions are rounded to whole pixels after each step,
 //! as in OpenCV, so that a window is a block of samples.
 //!
-//! Sums run in eight fixed lanes without fused operations, because a comparison selects the summed
-//! samples. The result is therefore the same on all CPUs.
+//! Sums run in eight fixed lanes without fused operations, so that the result is the same on all CPUs. Otherwise a
+//! rounding difference could select other samples in the next step.
 
 mod window;
 
@@ -22,8 +22,8 @@ use window::{Planes, Sums, window, window_any};
 /// Maximum radius in pixels. Its windows contain four million samples.
 pub const MAX_RADIUS: usize = 1024;
 
-/// Maximum absolute sample value and maximum range. Values beyond an edge are then always outside
-/// the range.
+/// Maximum absolute sample value and maximum range. The placeholder beyond the edges is then outside the range of
+/// every colour.
 pub const MAX_VALUE: f32 = 1e15;
 
 /// Parameters of the filter.
@@ -47,7 +47,7 @@ struct State<'a> {
     colour: &'a mut [f32],
 }
 
-/// Returns the colours at the modes, in the shape of the image (rows, columns, channels).
+/// Returns the colour of each pixel's mode, in the shape of the image (rows, columns, channels).
 pub fn filter(
     image: &[f32],
     shape: [usize; 3],
@@ -109,8 +109,7 @@ fn step(
     let limit = options.range * options.range;
     let sums = window(planes, state.at, state.colour, limit);
     if sums.count == 0.0 {
-        // The mean of several colours may be farther than the range from all samples. Keep the
-        // colour then.
+        // The mean colour can be farther than the range from all samples of the window. Keep it in this case.
         state.colour.copy_from_slice(before);
         return true;
     }
@@ -161,8 +160,8 @@ wide_fn! {
     }
 }
 
-/// Moves the pixels of a row to their modes. `window` sums a window around a position and replaces
-/// the given colour by the sum of the colours within the limit.
+/// Moves the pixels of a row to their modes. `window` selects the samples around a position whose squared distance to
+/// the given colour is within the limit, and replaces the colour by their sum.
 #[inline(always)]
 fn climb(
     planes: &Planes,

@@ -1,4 +1,4 @@
-//! Sums over the samples of a window that are near a colour.
+//! Sums over the samples of a window whose colours are near a given colour.
 
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
@@ -20,7 +20,7 @@ pub(super) struct Planes {
     stride: usize,
     pub(super) margin: [usize; 2],
     pub(super) shape: [usize; 2],
-    /// Mask of the lanes that are inside the window in its last block. A window has 2 margin + 1
+    /// Mask for the last block of each row. It selects the lanes that are inside the window. A window has 2 margin + 1
     /// samples along an axis.
     last: [u32; LANES],
 }
@@ -33,7 +33,7 @@ impl Planes {
         radius: usize,
     ) -> Result<Self> {
         let shape = grid.shape();
-        // Along an axis that does not wrap, a larger window than the axis adds no samples.
+        // Along an axis that does not wrap, a window larger than the axis adds no samples.
         let margin: [usize; 2] = std::array::from_fn(|axis| {
             if grid.wrap()[axis] {
                 radius
@@ -87,8 +87,9 @@ pub(super) struct Sums {
     pub(super) count: f32,
 }
 
-/// Sums over a window around `at`. The number of channels is a constant.
-#[allow(clippy::needless_range_loop)] // one lane of each channel of the same block
+/// Sums the samples of the window around `at` whose squared distance to `colour` is at most `limit`. The sum of their
+/// colours replaces `colour`. The number of channels is a constant, so that loops unroll.
+#[allow(clippy::needless_range_loop)] // the loops index several arrays by the same lane
 pub(super) fn window<const C: usize>(
     planes: &Planes,
     at: [usize; 2],
@@ -121,7 +122,7 @@ pub(super) fn window<const C: usize>(
                     distance[l] += d * d;
                 }
             }
-            // A mask has all bits set for samples that count, so that a bitwise "and" selects them.
+            // All bits of the mask are set for selected samples, so that a bitwise "and" keeps only these.
             let kept = if block + 1 == blocks {
                 &planes.last
             } else {

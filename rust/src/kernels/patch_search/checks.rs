@@ -1,4 +1,4 @@
-//! Checks of exemplars, sizes and choices of matches.
+//! Checks of exemplars, patch sizes and the options of a search.
 
 use super::{Exemplar, Pick};
 use crate::foundation::error::check_shape;

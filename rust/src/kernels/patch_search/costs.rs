@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// The filtered costs of one block. Forbidden positions are infinite.
+/// The filtered costs of one block. Forbidden positions have infinite cost.
 #[derive(Default)]
 pub(super) struct Map {
     pub(super) costs: Vec<f32>,
@@ -26,8 +26,8 @@ impl Map {
         self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
     }
 
-    /// Calls `f` for each position that costs at most `limit`. Few positions do, so rows and chunks
-    /// without any are skipped.
+    /// Calls `f` for each position that costs at most `limit`. Rows and chunks whose minimum exceeds the limit are
+    /// skipped, because few positions qualify.
     pub(super) fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
         for (r, row) in self
             .rows()

@@ -7,7 +7,7 @@
 use crate::foundation::fft::{self, Complex, Images};
 use crate::foundation::simd::wide_fn;
 
-/// Number of values that are multiplied together.
+/// Number of values that are processed together.
 const LANES: usize = 16;
 
 /// Transforms of one block size.
@@ -122,9 +122,9 @@ impl Plan {
     /// Returns the bound of the error of a correlation, relative to the norms from
     /// [`Self::correlate`] and its caller.
     ///
-    /// See Higham, *Accuracy and Stability of Numerical Algorithms*, theorem 24.2. The error of a
-    /// transform of 2^t points is at most t (1 + 4 sqrt 2) u in the 2-norm. The code uses 8 u for
-    /// 6.7 u. The rest covers products and rounded inputs.
+    /// See Higham, *Accuracy and Stability of Numerical Algorithms*, theorem 24.2. The error of a transform of 2^t
+    /// points is at most t (1 + 4 sqrt 2) u in the 2-norm. The code rounds 1 + 4 sqrt 2 = 6.7 up to 8. The other terms
+    /// cover products and rounded inputs.
     pub(super) fn epsilon(&self, layers: usize) -> f64 {
         let log = ((self.size[0] * self.size[1]) as f64).log2();
         f64::from(f32::EPSILON) * 0.5 * (8.0 * log.ceil() + 16.0 + layers as f64)
@@ -190,7 +190,7 @@ impl Plan {
             out[r * valid[1]..][..valid[1]].copy_from_slice(&row[..valid[1]])
         };
         self.images.inverse(spectrum, valid[0], take, images);
-        // Parseval's theorem. The half spectrum counts twice, and the multiplier contains the
+        // Apply Parseval's theorem. The values of the half spectrum count twice, and the multiplier contains the
         // factor 1 / points.
         (2.02 * squares * (height * width) as f64).sqrt()
     }
@@ -215,8 +215,8 @@ wide_fn! {
     /// Sums spectrum times multiplier over all layers. Returns the sum of the squares of the
     /// result.
     ///
-    /// This only filters, because every match is scored again exactly. Rounding may therefore
-    /// differ between CPUs. SIMD registers make the block search 33 % faster, as measured.
+    /// Rounding may differ between CPUs, because the result is only a filter and every match is scored again exactly.
+    /// SIMD registers make the block search 33 % faster, as measured.
     fn multiply(spectra: &[f32], multipliers: &[Multiplier], out: &mut [Complex<f32>]) -> f64 {
         let values = 2 * out.len();
         let mut squares = [0.0f64; 4];

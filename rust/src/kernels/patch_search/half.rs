@@ -1,9 +1,9 @@
-//! Good matches by a search at half the resolution. Each step has a quarter of the positions and a
-//! quarter of the samples.
+//! Good matches by a search at half the resolution. Each halving leaves a quarter of the positions, and a quarter of
+//! the samples of a patch.
 //!
-//! The search at half the resolution proposes positions, and the positions around them are scored
-//! exactly. The best match at full resolution is nearly always among them. A patch that is also
-//! chosen by other criteria needs only a good match.
+//! The search at half the resolution proposes positions, and the positions around them are scored exactly. The best
+//! match at full resolution is nearly always among them. A good match is enough if the patch is also chosen by other
+//! criteria.
 
 use std::ops::RangeInclusive;
 
@@ -89,7 +89,7 @@ impl Index {
     }
 }
 
-/// Returns the positions along an axis that a position at half the resolution stands for.
+/// Returns the positions along an axis that correspond to a position at half the resolution.
 fn stands_for(whole: &Exemplar, axis: usize, at: usize) -> RangeInclusive<usize> {
     (2 * at).saturating_sub(1)..=(2 * at + 1).min(whole.shape[axis] - 1)
 }
@@ -111,7 +111,7 @@ pub(super) fn halve(whole: &Exemplar, channels: usize) -> Vec<f32> {
     data
 }
 
-/// Returns the positions at half the resolution that stand for at least one allowed position.
+/// Returns a flag for each position at half the resolution: whether it corresponds to at least one allowed position.
 fn halve_allowed(whole: &Exemplar) -> Option<Vec<bool>> {
     let [rows, columns] = whole.shape.map(|n| n / 2);
     whole.allowed.as_ref().map(|allowed| {
@@ -133,8 +133,8 @@ fn halve_allowed(whole: &Exemplar) -> Option<Vec<bool>> {
     })
 }
 
-/// Computes the means of 2 x 2 samples of two lines. `C` is the number of channels if it is a known
-/// constant, so that the loop unrolls, else 0.
+/// Computes the means of 2 x 2 samples of two lines. `C` is the number of channels if this is 1 or 3, so that the loop
+/// unrolls. For other numbers `C` is 0.
 fn halve_line<const C: usize>(up: &[f32], down: &[f32], channels: usize, out: &mut [f32]) {
     let n = if C == 0 { channels } else { C };
     let places = up.chunks_exact(2 * n).zip(down.chunks_exact(2 * n));

@@ -102,8 +102,8 @@ fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -
         }
 }
 
-/// [`mirrors`] for exemplars of the same shape. `C` is the number of channels if it is a known
-/// constant, so that pixels are compared at once, else 0.
+/// [`mirrors`] for exemplars of the same shape. `C` is the number of channels if this is 1 or 3, so that whole pixels
+/// are compared in one step. For other numbers `C` is 0.
 fn turned<const C: usize>(
     one: &Exemplar,
     other: &Exemplar,
@@ -120,7 +120,7 @@ fn turned<const C: usize>(
             return a == b;
         }
         let pairs = a.chunks_exact(n).zip(b.chunks_exact(n).rev());
-        // Compare whole rows without an early exit, which is faster for the mirror images.
+        // Compare whole rows without an early exit, which is faster for exemplars that are mirror images.
         pairs.fold(true, |same, (a, b)| {
             (0..n).fold(same, |same, k| same & (a[k] == b[k]))
         })

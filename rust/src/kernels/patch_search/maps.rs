@@ -7,14 +7,14 @@ use super::{Block, Index, Match, Pick, Query, too_dear};
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// If scoring a position takes fewer multiplications than this per unit of the filter's work,
-/// positions are scored directly.
+/// Cost of a multiplication of direct scoring, in units of the filter's work. Positions are scored directly if this is
+/// cheaper than the filter.
 const DIRECT: f64 = 1.0;
 
-/// Number of candidates that are scored before the best cost is checked again.
+/// Number of candidates that are scored before the search checks whether it can stop.
 const ROUND: usize = 4096;
 
-/// Number of candidates of a task.
+/// Number of candidates in each parallel task.
 const CHUNK: usize = 16;
 
 /// Buffers of one search.
@@ -24,7 +24,7 @@ pub(super) struct Workspace {
     multipliers: Vec<Multiplier>,
     maps: Vec<Map>,
     candidates: Vec<Candidate>,
-    /// Candidates that were scored in earlier rounds.
+    /// Candidates that were scored for earlier matches.
     scored: Vec<Candidate>,
 }
 
@@ -54,7 +54,7 @@ impl Index {
         Ok(())
     }
 
-    /// Fills the maps of some blocks. Returns factor and offset: an exact cost is the filtered cost
+    /// Computes the cost maps of a range of blocks. Returns a factor and an offset: an exact cost is the filtered cost
     /// times the factor, plus the offset.
     pub(super) fn filter(
         &self,
@@ -142,7 +142,7 @@ impl Index {
         Ok((unit, offset))
     }
 
-    /// Fills the maps with exact scores instead, which is faster for few samples or positions.
+    /// Fills the maps with exact scores instead of filtered costs, which is faster for few samples or positions.
     fn evaluate(
         &self,
         query: &Query<'_>,
@@ -283,7 +283,7 @@ impl Index {
                 });
             });
         }
-        // Reuse the exact costs of candidates from earlier rounds.
+        // Reuse the exact costs of candidates that were scored for earlier matches.
         candidates.sort_unstable_by_key(|c| c.at);
         let mut known = scored.iter().peekable();
         for c in candidates.iter_mut() {

@@ -58,7 +58,7 @@ pub struct Query<'a> {
     pub shape: [usize; 2],
 }
 
-/// Number and choice of the matches.
+/// Selection of the matches that a search returns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pick {
     /// Maximum number of matches.
@@ -71,7 +71,7 @@ pub struct Pick {
 }
 
 impl Default for Pick {
-    /// Returns the choice of only the best match.
+    /// Selects only the best match.
     fn default() -> Self {
         Self {
             count: 1,
@@ -105,7 +105,7 @@ pub struct Index {
     spectra: OnceLock<Spectra>,
     /// The same exemplars at half the resolution, if patches are large enough.
     half: OnceLock<Option<Box<Index>>>,
-    /// List of the allowed positions, in order, of each exemplar that has only few.
+    /// List of the allowed positions, in order, of each exemplar that has few of them.
     open: Vec<Option<Vec<u32>>>,
     /// Data that depend only on the samples.
     known: Arc<Known>,
@@ -119,8 +119,8 @@ struct Block {
     corner: [usize; 2],
 }
 
-/// Buffers that are kept for reuse. The pool never waits. If the lock is held elsewhere, or in the parent of a fork,
-/// the caller gets a new buffer.
+/// Buffers that are kept for reuse. The pool never waits for its lock. If another thread holds the lock, or held it
+/// when the process was forked, the caller gets a new buffer.
 struct Pool<T>(Mutex<Vec<T>>);
 
 impl<T: Default> Pool<T> {
@@ -141,9 +141,8 @@ impl<T: Default> Pool<T> {
 
 /// Returns the value of a cell, and computes it if the cell is empty.
 ///
-/// The value is computed before the cell is locked. Otherwise a pool thread might wait for the lock
-/// although it has to compute the value itself. Two threads that come at the same time compute the
-/// same value, and the first one is kept.
+/// The value is computed before the cell is locked. Otherwise a pool thread could wait for a value whose computation
+/// needs this thread. If two threads arrive at the same time, both compute the value, and the first result is kept.
 fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     if let Some(made) = cell.get() {
         return made;
@@ -250,7 +249,8 @@ impl Index {
         Ok(found[0].cost)
     }
 
-    /// [`Self::best`] among given (exemplar, row, column). The `allowed` positions are ignored.
+    /// Returns the best of the given positions (exemplar, row, column), as [`Self::best`] does. The `allowed` flags of
+    /// the exemplars are ignored.
     pub fn best_among(
         &self,
         query: &Query<'_>,
@@ -319,8 +319,8 @@ impl Index {
         Ok(found)
     }
 
-    /// Returns the filtered costs of all positions of one exemplar, and the bound of their error.
-    /// There are (rows - p + 1) x (columns - q + 1) positions. Forbidden positions are infinite.
+    /// Returns the filtered costs of all positions of one exemplar, and the bound of their error. There are (rows - p
+    /// + 1) x (columns - q + 1) positions. Forbidden positions have infinite cost.
     pub fn cost_map(
         &self,
         query: &Query<'_>,
@@ -374,7 +374,7 @@ fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
         .then_with(|| (a.exemplar, a.row, a.column).cmp(&(b.exemplar, b.row, b.column)))
 }
 
-/// Positions are listed if at most one in this number is allowed.
+/// Allowed positions are listed if at most one position in this number is allowed.
 const FEW: usize = 4;
 
 /// Returns the allowed positions of an exemplar, if there are few.

@@ -14,7 +14,7 @@ const LANES: usize = 8;
 /// Number of rows between comparisons with the bound.
 const LOOK: usize = 4;
 
-/// A query in the forms that scores and kernels need.
+/// A query, converted for direct scores and for the kernels of the filter.
 #[derive(Default)]
 pub(super) struct Prepared {
     shape: [usize; 2],
@@ -24,8 +24,8 @@ pub(super) struct Prepared {
     weight: Vec<f32>,
     /// Range of samples in each row that contains all non-zero weights, rounded to whole lanes.
     weighed: Vec<[usize; 2]>,
-    /// Differences from the mean of the exemplars, divided by the largest difference. Samples of
-    /// weight 0 have 0.
+    /// Differences of the patch from the mean of the exemplars, divided by the largest difference. Samples of weight 0
+    /// have 0.
     centred: Vec<f32>,
     largest_weight: f64,
     largest: f64,
@@ -166,7 +166,8 @@ impl Prepared {
             .sum()
     }
 
-    /// Returns the cost of one unit of the filter, and the cost that the filter omits.
+    /// Returns the cost that corresponds to one unit of the filter, and the constant cost `sum w T^2` that the filter
+    /// omits.
     pub(super) fn unit(&self) -> (f64, f64) {
         let most = (self.largest / self.scale).max(1.0);
         (

@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// previous join.
 const BATCH: usize = 64;
 
-/// Number of batches between checks whether the caller wants to stop.
+/// Number of batches between checks for cancellation.
 const ASK: usize = 1024;
 
 /// Data of a region, stored at the root of its tree.
@@ -25,11 +25,11 @@ struct Tree {
 
 pub(super) struct Forest {
     scale: f64,
-    /// Parent of each pixel of the frame. Roots are their own parents. Pixels in the margin of a
-    /// wrapped axis belong to the pixels that they are copies of.
+    /// Parent of each pixel of the frame. Roots are their own parents. The parent of a pixel in the margin of a
+    /// wrapped axis is the pixel that it copies.
     parents: Vec<u32>,
     trees: Vec<Tree>,
-    /// Step from the first end of an edge of each direction to the second end.
+    /// For each direction, the step from the first end of an edge to the second end.
     steps: [u32; DIRECTIONS],
     triangles: [Vec<Triangle>; DIRECTIONS],
     /// Inactive edges that have woken, the lightest first.
@@ -49,7 +49,7 @@ struct Side {
     /// Step to the pixel of the side.
     pixel: isize,
     direction: usize,
-    /// Step to the weight of the side, from the weight of the edge's pixel along the row.
+    /// Step to the weight of the side, from the weight of direction 0 at the edge's pixel.
     weight: isize,
 }
 
@@ -241,8 +241,8 @@ impl Forest {
         }
     }
 
-    /// Wakes the heaviest sides of an edge's triangles. Only sides from the end of the edge whose
-    /// tree is not full to another tree that is not full are woken.
+    /// Wakes the sides of an edge's triangles that are the heaviest of their triangle. A side is woken only if it
+    /// connects the end of the edge whose tree is not full with another tree that is not full.
     fn wake(&mut self, edge: Edge, end: usize, roots: [u32; 2], weights: &[f32]) -> Result<()> {
         let (pixel, direction) = (
             edge as u32 as usize / DIRECTIONS,

@@ -13,10 +13,9 @@
 //!   have the area of their union. The lighter edge u-y has joined u and y, or has separated two regions that are
 //!   large enough. So u-v is never the edge that joins a small region.
 //!
-//! The heaviest edges of triangles are therefore left out of the list of edges. An edge stays in
-//! the list if in all its triangles both other edges are such edges themselves, because these might
-//! not wake it. `Forest` wakes inactive edges. For photographs, 40 % of the edges are sorted, and 1
-//! in 80 of the others wakes.
+//! The heaviest edges of triangles are therefore left out of the list of edges. An edge stays in the list if, in all
+//! its triangles, both other edges are heaviest edges themselves. Such edges might not wake it. `Forest` wakes
+//! inactive edges. For photographs, 40 % of the edges are sorted, and 1 in 80 of the others wakes.
 
 use super::{DIRECTIONS, Edge, Frame, pack};
 use crate::Result;

@@ -8,8 +8,8 @@
 //!    divided by the area (equation 4).
 //! 3. Regions below the minimum area join their neighbour over the lightest edge (section 5).
 //!
-//! Weights are computed in double precision and rounded to single. Ties go to the first pixel. For
-//! one pixel the order is along the row, along the column, and the two diagonals. Regions are
+//! Weights are computed in double precision and rounded to single. Edges of equal weight are taken in the order of
+//! their first pixels. For one pixel the order is along the row, along the column, and the two diagonals. Regions are
 //! numbered by their first pixels.
 //!
 //! Departure from the paper: 60 % of the edges are never sorted, and the result is the same. See
@@ -32,16 +32,15 @@ pub const MAX_BLUR: f64 = 64.0;
 /// Maximum absolute sample value, and maximum scale.
 pub const MAX_VALUE: f64 = 1e15;
 
-/// Measured bytes of memory for a pixel, and for a sample of a row that is smoothed.
+/// Memory for a pixel, and for a sample of a row that is being smoothed, in bytes (measured).
 const PIXEL: usize = 128;
 const SAMPLE: usize = 64;
 
 /// Parameters of the segmentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Limit of a region of one pixel, in the units of the image (k in the paper). A region of n
-    /// pixels has 1 / n of it, added to its heaviest inner edge. A larger scale gives larger
-    /// regions.
+    /// Limit of a region of one pixel, in the units of the image (k in the paper). The limit of a region of n pixels
+    /// is its heaviest inner edge plus `scale / n`. A larger scale gives larger regions.
     pub scale: f64,
     /// Standard deviation of the Gaussian that smooths the image, in pixels.
     pub blur: f64,
@@ -126,7 +125,7 @@ impl Frame {
     /// Returns the frame of a grid.
     ///
     /// # Errors
-    /// The grid has more pixels than the number of edges that 32 bits can index.
+    /// The grid has more edges than 32 bits can index.
     fn new(grid: &Grid<2>) -> Result<Self> {
         let shape = grid.shape();
         let all = shape.map(|n| n as u128 + 2).iter().product::<u128>();

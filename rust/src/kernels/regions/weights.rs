@@ -7,7 +7,7 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::simd::wide_fn;
 
-/// Number of rows of a task, which smooths one more row.
+/// Number of rows in each parallel task. A task smooths one more row.
 const ROWS: usize = 32;
 
 /// Radius of the truncated Gaussian, in standard deviations.
@@ -72,8 +72,8 @@ pub(super) fn measure(
 }
 
 wide_fn! {
-    /// Computes the distances between the colours of two rows. `shifts` are the first pixels of the
-    /// two rows.
+    /// Computes the distances between the colours of two rows. `shifts` are the positions of the first compared pixels
+    /// in the two rows.
     fn differ(one: &[f64], other: &[f64], shifts: [usize; 2], stride: usize, sums: &mut [f64], out: &mut [f32]) {
         sums.fill(0.0);
         for (one, other) in one.chunks_exact(stride).zip(other.chunks_exact(stride)) {
@@ -109,7 +109,7 @@ struct Smoother<'a> {
     taps: Vec<f64>,
 }
 
-/// Buffers of a row: smoothed along columns and padded, and smoothed in both directions.
+/// Buffers of a row: `padded` is smoothed along columns, and `flat` in both directions.
 struct Scratch {
     padded: Vec<f64>,
     flat: Vec<f64>,
@@ -127,8 +127,7 @@ impl Scratch {
 }
 
 impl Smoother<'_> {
-    /// Smooths a row in both directions. The output has one line for each channel, each with a
-    /// wrapped margin.
+    /// Smooths a row in both directions. The output has one line for each channel, with a wrapped margin.
     fn smooth(&self, row: usize, scratch: &mut Scratch, out: &mut [f64]) {
         let ([_, columns], channels) = (self.frame.shape, self.channels);
         let reach = self.taps.len() - 1;
@@ -140,7 +139,7 @@ impl Smoother<'_> {
         let Scratch { padded, flat } = scratch;
         let middle = &mut padded[reach * channels..][..length];
         start(line(0), self.taps[0], middle);
-        // Sum from the ends to the centre, in the same order as SciPy.
+        // Add the pairs of rows from the farthest to the nearest, in the same order as SciPy.
         for by in (1..=reach).rev() {
             add(
                 line(-(by as isize)),

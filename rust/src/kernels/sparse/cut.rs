@@ -14,10 +14,10 @@ const HUB: usize = 4;
 pub(super) enum Cut {
     /// The part is eliminated at once.
     Leaf,
-    /// The unknowns of the first and then of the second side come first. The remaining ones
-    /// separate them.
+    /// The list contains the unknowns of the first side, then of the second side, then of the separator. `low` and
+    /// `high` are the numbers of unknowns of the two sides.
     Parts { low: usize, high: usize },
-    /// Numbers of unknowns of parts that are not coupled to each other.
+    /// Number of unknowns of each piece. The pieces are not coupled to each other.
     Pieces(Vec<usize>),
 }
 
@@ -151,7 +151,7 @@ impl Scratch {
         hubs
     }
 
-    /// Divides unknowns along a level, or at the hubs if there are fewer of them.
+    /// Divides unknowns along a level, or at the hubs if there are fewer hubs than unknowns of the level.
     fn cut_at(&mut self, part: &mut [Item], links: &Links, at: usize, hubs: &[u32]) -> Cut {
         if (1..self.counts[at] as usize).contains(&hubs.len()) {
             return self.share_out(part, |item| {
@@ -254,8 +254,8 @@ fn bound(part: &[Item]) -> (Item, Item) {
     (low, high)
 }
 
-/// Returns the cost and the first of `reach` lines that are the best separator: few unknowns, and
-/// equal numbers on both sides.
+/// Returns the cost and the first line of the best separator of `reach` adjacent lines. A good separator has few
+/// unknowns, and equal numbers of unknowns on both sides.
 fn choose(counts: &[u32], reach: usize) -> Option<(f64, usize)> {
     let total: u64 = counts.iter().map(|&n| u64::from(n)).sum();
     let mut best: Option<(f64, usize)> = None;

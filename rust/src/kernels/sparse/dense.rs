@@ -1,8 +1,7 @@
-//! The dense part: the columns of a front are factored, and their contribution is subtracted from
-//! the rest.
+//! Dense operations: the columns of a front are factored, and their contribution is subtracted from the rest.
 //!
-//! Arrays are stored column by column. Every number is a sum over the previous columns in their
-//! order, and no operation is fused. The result is therefore the same for all registers.
+//! Arrays are stored column by column. Every value is a sum over the previous columns in their order, and no operation
+//! is fused. The result is therefore the same for any width of SIMD registers.
 
 use super::plan::TILE;
 use crate::Result;
@@ -12,7 +11,7 @@ use crate::foundation::simd::{wide_fn, widest_fn};
 /// Maximum number of rows that are processed together.
 const TALL: usize = 16;
 
-/// Returns the products of `N` rows with four further rows, summed over columns of `height`.
+/// Returns the products of `N` rows with four further rows, summed over all columns. Each column has `height` values.
 #[inline(always)]
 fn multiply<const N: usize>(
     columns: &[f64],
@@ -212,8 +211,8 @@ pub(super) struct Run {
     there: usize,
 }
 
-/// Lists runs of rows. `into` contains the row of the front for each row. No run continues from own
-/// columns into the rest.
+/// Lists runs of rows. `into` contains the row of the parent's front for each row of the child. A run does not
+/// continue from the own columns into the rest.
 pub(super) fn list_runs(into: &[u32], columns: usize, runs: &mut Vec<Run>) {
     runs.clear();
     for (first, &there) in into.iter().enumerate() {
@@ -250,7 +249,7 @@ wide_fn! {
             };
             for (down, run) in runs[k..].iter().enumerate() {
                 for j in 0..across.len {
-                    // Only the part below the diagonal of a diagonal square is added.
+                    // Add only the lower triangle of a square on the diagonal.
                     let skip = if down == 0 { j } else { 0 };
                     let to = (across.there + j - less) * side + run.there + skip - less;
                     let from = (across.first + j) * size + run.first + skip;

@@ -15,13 +15,13 @@ const WHAT: &str = "the factor of the matrix";
 pub(super) struct Part {
     /// Range of the blocks.
     pub(super) fronts: Range<usize>,
-    /// Columns of the own unknowns of each block, one block after the other. A column has the
-    /// reciprocal of the diagonal, the numbers below it, and the further rows.
+    /// Columns of the own unknowns of each block, one block after the other. A column contains the reciprocal of its
+    /// diagonal entry, then the values of the own unknowns below it and of the further rows.
     pub(super) values: Vec<f64>,
 }
 
 impl Part {
-    /// Returns the blocks with their numbers.
+    /// Returns the blocks with their values.
     pub(super) fn blocks<'a>(
         &'a self,
         plan: &'a Plan,
@@ -106,7 +106,7 @@ impl Task<'_> {
         Ok((parts, rest))
     }
 
-    /// Factors blocks one after the other. The last one may leave a contribution.
+    /// Factors blocks one after the other. The last block may have a contribution to a parent outside the range.
     fn run(&self, range: Range<usize>) -> Result<Done> {
         let fronts = &self.plan.fronts[range.clone()];
         let largest = fronts.iter().map(Front::area).max();
@@ -179,7 +179,7 @@ impl Task<'_> {
         }
     }
 
-    /// Adds the contribution of a child.
+    /// Adds the contribution of a child to a front and to its rest.
     fn hand_on(
         &self,
         child: usize,
@@ -202,7 +202,7 @@ impl Task<'_> {
         );
     }
 
-    /// Factors a block, subtracts its contribution from the rest, and stores its numbers.
+    /// Factors a block, subtracts its contribution from the rest, and stores its values.
     fn finish(
         &self,
         front: &Front,

@@ -4,7 +4,7 @@ use super::Checked;
 use crate::Result;
 use crate::foundation::memory;
 
-/// Maximum distance along an axis of coupled unknowns on a grid.
+/// Maximum distance between coupled unknowns of a grid along an axis.
 const FAR: u32 = 8;
 /// Maximum number of different distances between row and column over all entries. With more, the
 /// unknowns are not treated as a grid.
@@ -32,8 +32,8 @@ impl Grid {
         [row, column, row + column, row + (self.columns - column)]
     }
 
-    /// Returns the grid that follows from the distances between rows and columns of the entries, or
-    /// `None` if there is not a useful one.
+    /// Returns the grid that follows from the distances between rows and columns of the entries, or `None` if the
+    /// unknowns do not form a grid.
     pub(super) fn recognise(matrix: &Checked<'_>) -> Result<Option<Self>> {
         let size = matrix.size();
         // Collect the different distances.

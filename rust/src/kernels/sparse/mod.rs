@@ -7,11 +7,11 @@
 //! - `order` chooses the order of elimination. `cut` divides the unknowns, and `grid` describes
 //!   their couplings.
 //! - `plan` computes the rows of each block.
-//! - `factor` computes the numbers, with the dense operations in `dense`.
-//! - `solve` solves with them.
+//! - `factor` computes the values of the factor, with the dense operations in `dense`.
+//! - `solve` solves systems with the factor.
 //!
-//! Every number is computed by one thread, by sums in a fixed order without fused operations. The
-//! result is therefore the same for any number of threads and for all registers.
+//! Every value is computed by one thread, by sums in a fixed order without fused operations. The result is therefore
+//! the same for any number of threads and any width of SIMD registers.
 
 mod cut;
 mod dense;
@@ -125,7 +125,7 @@ pub struct Cholesky {
     plan: Plan,
     /// Reciprocal diagonal entries of unknowns that are not coupled to others.
     alone: Vec<f64>,
-    /// The numbers of all blocks.
+    /// The values of all blocks of the factor.
     parts: Vec<Part>,
 }
 
@@ -133,7 +133,7 @@ impl Cholesky {
     /// Factors a positive definite matrix. The factor and the work on it may take at most `limit`
     /// bytes.
     pub fn new(matrix: &Lower<'_>, limit: usize, monitor: &Monitor) -> Result<Self> {
-        // Memory for the pattern of the factor, without its numbers.
+        // Check the memory for the pattern of the factor, without its values.
         memory::room("the order of the matrix", matrix.rows.len(), 64)?;
         let matrix = Checked::new(*matrix)?;
         let order = order::dissect(&matrix, monitor)?;

@@ -16,7 +16,7 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 
-/// Maximum number of unknowns that are not divided any further.
+/// Maximum number of unknowns in a part that is not divided any further.
 const LEAF: usize = 20;
 
 /// Unknowns that are eliminated together.

@@ -1,8 +1,8 @@
-//! The pattern of a factor: the rows of each block, and the positions of its numbers.
+//! The pattern of a factor: the rows of each block, and the positions of its values.
 //!
-//! The terms are from the multifrontal method of Duff and Reid (1983). The front of a block contains the columns of
-//! its own unknowns. The rest is the contribution of the block to later blocks. It is added to the parent, whose rows
-//! include all rows of the rest.
+//! The terms are from the multifrontal method of Duff and Reid (1983). The front of a block is a dense array with the
+//! columns of its own unknowns. The *rest* of a block is a square over its further rows: its contribution to later
+//! blocks. The rest is added to the parent, whose rows include all these rows.
 
 use std::ops::Range;
 
@@ -23,9 +23,9 @@ pub(super) struct Front {
     pub(super) start: usize,
     /// Number of own unknowns.
     pub(super) own: usize,
-    /// Range of the further rows in [`Plan::rows`].
+    /// Range in [`Plan::rows`] of the further rows, which are below the own unknowns.
     pub(super) rows: Range<usize>,
-    /// Position of the numbers in the factor. Each own unknown has the rows from its diagonal on.
+    /// Position of the block's values in the factor. The column of each own unknown starts at its diagonal.
     pub(super) values: usize,
     /// The block that receives the rest.
     pub(super) parent: Option<usize>,
@@ -51,7 +51,7 @@ impl Front {
         self.columns() + self.rest()
     }
 
-    /// Number of values of the factor.
+    /// Number of values of the block in the factor.
     pub(super) fn len(&self) -> usize {
         self.own * (self.own + 1) / 2 + self.own * self.rows.len()
     }
@@ -100,14 +100,14 @@ pub(super) enum Job {
 
 /// Number of multiplications below which work is not divided.
 const LITTLE: u64 = 1 << 21;
-/// Work is divided down to one part in this number of the total.
+/// Work is divided further if it exceeds the total work divided by this number.
 const SHARES: u64 = 16;
-/// Maximum depth in the tree of divided work.
+/// Maximum depth of the tree of jobs.
 const DEEP: usize = 6;
 /// Maximum number of jobs that one job waits for.
 const MOST: usize = 8;
 
-/// The entries of a matrix by the columns of a factor.
+/// The entries of a matrix, sorted by the columns of the factor.
 #[derive(Debug)]
 pub(super) struct Entries {
     /// Start of the entries of each place in the order, and the end of the last ones.
@@ -119,8 +119,8 @@ pub(super) struct Entries {
 }
 
 impl Entries {
-    /// Sorts entries by their unknown that is eliminated first. The rows are still places in the
-    /// order.
+    /// Assigns each entry to the column of its first eliminated unknown. The rows are places in the order of
+    /// elimination. Rows of the front replace them later.
     fn new(matrix: &Checked<'_>, unknown: &[u32]) -> Result<Self> {
         let (what, size) = ("the order of the matrix", unknown.len());
         let mut place: Vec<u32> = memory::filled(what, 0, size)?;

@@ -6,7 +6,7 @@ use crate::Result;
 use crate::foundation::memory;
 use crate::foundation::simd::wide_fn;
 
-/// Replaces all right-hand sides by the solutions at the same time, so that each number of the factor is read once.
+/// Replaces all right-hand sides by the solutions at the same time, so that each value of the factor is read once.
 pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -> Result<()> {
     let (plan, what) = (&factor.plan, "the solution");
     let most = plan
@@ -71,8 +71,8 @@ pub(super) fn solve<const N: usize>(factor: &Cholesky, sides: [&mut [f64]; N]) -
     Ok(())
 }
 
-/// Splits off `B` columns of a block. The first has `height` numbers, and each following one has
-/// one number less.
+/// Splits off `B` columns of a block. The first column has `height` values, and each further column has one value
+/// less.
 #[inline(always)]
 fn split<const B: usize>(numbers: &[f64], height: usize) -> ([&[f64]; B], &[f64]) {
     let mut left = numbers;
@@ -84,8 +84,8 @@ fn split<const B: usize>(numbers: &[f64], height: usize) -> ([&[f64]; B], &[f64]
     (columns, left)
 }
 
-/// Solves for `B` unknowns forwards, and subtracts their contribution from the unknowns after them.
-/// Returns the remaining numbers of the block.
+/// Forward substitution: solves for `B` unknowns, and subtracts their contribution from the unknowns after them.
+/// Returns the remaining values of the block.
 #[inline(always)]
 fn forward_columns<'a, const N: usize, const B: usize>(
     numbers: &'a [f64],
@@ -119,7 +119,7 @@ fn forward_columns<'a, const N: usize, const B: usize>(
     left
 }
 
-/// Solves for `B` unknowns backwards, given the unknowns after them.
+/// Backward substitution: solves for `B` unknowns, given the unknowns after them.
 #[inline(always)]
 fn backward_columns<const N: usize, const B: usize>(
     numbers: &[f64],
@@ -133,7 +133,7 @@ fn backward_columns<const N: usize, const B: usize>(
     let of: [&[f64]; B] = std::array::from_fn(|j| &columns[j][B - j..][..rest]);
     for x in x {
         let (own, after) = x[at..height].split_at_mut(B);
-        // One sum for every eighth row, combined in a fixed order.
+        // Sum every eighth row separately, and combine the eight sums in a fixed order.
         let mut sums = [[0.0; LANES]; B];
         let whole = rest - rest % LANES;
         for i in (0..whole).step_by(LANES) {
@@ -171,8 +171,8 @@ fn backward_columns<const N: usize, const B: usize>(
 }
 
 wide_fn! {
-    /// Solves for the `own` unknowns of a block with `height` rows forwards, and subtracts their
-    /// contribution from the further rows.
+    /// Forward substitution for the `own` unknowns of a block with `height` rows. Subtracts their contribution from
+    /// the further rows.
     fn forward<const N: usize>(
         numbers: &[f64],
         own: usize,
@@ -193,8 +193,7 @@ wide_fn! {
 }
 
 wide_fn! {
-    /// Solves for the `own` unknowns of a block with `height` rows backwards, given the further
-    /// rows.
+    /// Backward substitution for the `own` unknowns of a block with `height` rows, given the further rows.
     fn backward<const N: usize>(
         numbers: &[f64],
         own: usize,

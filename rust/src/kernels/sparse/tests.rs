@@ -12,7 +12,7 @@ struct Triangle {
 }
 
 impl Triangle {
-    /// The screened Laplacian of pairs with weights.
+    /// Returns the Laplacian of weighted pairs of unknowns, with `screening` added to its diagonal.
     fn laplacian(size: usize, pairs: &[(usize, usize, f64)], screening: f64) -> Self {
         let mut columns = vec![std::collections::BTreeMap::new(); size];
         for (i, column) in columns.iter_mut().enumerate() {

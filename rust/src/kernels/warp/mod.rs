@@ -1,13 +1,13 @@
-//! Images warped by moved points, and shapes moved as a whole: the source coordinates of each
-//! output pixel.
+//! Source coordinates of each output pixel, for images that are warped by moved points and for shapes that are moved
+//! as a whole.
 //!
 //! [`mesh`] warps a dense mesh with one vertex for each source pixel. [`scattered()`] triangulates
 //! scattered points. Both move triangles to the targets of their corners and rasterise them there.
 //! The source of a pixel is the barycentric interpolation of the source corners.
 //!
-//! If several triangles cover a pixel, the one with the largest weight is visible. Ties go to a
-//! triangle that is not flipped, then to the first. A [`Motion`] moves one shape by an affine map,
-//! to be inserted among others.
+//! If several triangles cover a pixel, the one with the largest weight is visible. Ties go to a triangle that is not
+//! flipped, then to the first. A [`Motion`] instead moves a single shape by an affine map, so that it can be inserted
+//! between other shapes.
 
 mod placed;
 mod raster;
@@ -31,7 +31,7 @@ pub struct Warped {
     pub drawn: usize,
     /// Number of drawn triangles that the warp flips or flattens.
     pub flipped: usize,
-    /// Number of flipped triangles whose corners all have a weight.
+    /// Number of flipped triangles whose three corners have weight 1.
     pub flipped_heavy: usize,
 }
 

@@ -43,11 +43,11 @@ pub struct Placed {
     pub places: Vec<[f32; 2]>,
     /// Distance to the outline at the source, in source pixels.
     pub distance: Vec<f32>,
-    /// Whether the source coordinates are on the canvas, which the source shares.
+    /// Flags of the pixels whose source coordinates are on the canvas, which source and output share.
     pub inside: Vec<bool>,
-    /// Whether the source is on the canvas and deeper in the shape than requested.
+    /// Flags of the pixels whose source is on the canvas and more than the requested depth inside the shape.
     pub deep: Vec<bool>,
-    /// Number of pixels inside whose source belongs to the shape.
+    /// Number of pixels whose source is on the canvas and inside the shape.
     pub count: usize,
 }
 
@@ -146,7 +146,7 @@ impl Motion {
                 std::array::from_fn(|axis| {
                     let back = inverse[axis][0] * row + inverse[axis][1] * column;
                     let at = back + self.centre[axis];
-                    // Round if whole pixels map to whole pixels, because the centre would add
+                    // Round if whole pixels map to whole pixels, because subtracting and adding the centre causes
                     // rounding errors.
                     (if whole { at.round_ties_even() } else { at }) as f32
                 })

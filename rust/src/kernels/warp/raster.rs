@@ -1,7 +1,7 @@
 //! Triangles rasterised in bands of rows.
 //!
-//! A band visits every triangle in order, so the visible triangle of a pixel does not depend on
-//! threads. Rows of cells that do not reach the band are skipped by their bounds.
+//! Each band draws the triangles in the same order, so the visible triangle of a pixel does not depend on the number
+//! of threads. Rows of mesh cells whose bounds do not reach a band are skipped.
 
 use super::{Point, Warped};
 use crate::foundation::memory;
@@ -25,8 +25,8 @@ pub struct Mesh<'a> {
     pub shape: [usize; 2],
     /// Target of each pixel.
     pub target: &'a [Point],
-    /// Weight of each vertex. The heaviest of several layers is visible. Triangles with a vertex of
-    /// weight [`Mesh::VOID`] are not drawn.
+    /// Weight of each vertex. If several triangles cover a pixel, the one with the largest total weight is visible.
+    /// Triangles with a vertex of weight [`Mesh::VOID`] are not drawn.
     pub weight: &'a [u8],
 }
 
@@ -83,7 +83,7 @@ impl Band<'_> {
         let [a, b, c] = t.target;
         let low = |axis: usize| a[axis].min(b[axis]).min(c[axis]) - REACH;
         let high = |axis: usize| a[axis].max(b[axis]).max(c[axis]) + REACH;
-        // Most triangles do not contain a pixel centre, so they end here.
+        // Return early if no pixel centre of this band can be inside the triangle.
         let y = pixels(
             low(0),
             high(0),
@@ -98,7 +98,7 @@ impl Band<'_> {
         if after.abs() < FLAT || after.is_nan() {
             return;
         }
-        // A heavier triangle has a higher rank. With equal weights, an unflipped triangle does.
+        // The rank increases with the weight. With equal weights, an unflipped triangle ranks above a flipped one.
         let rank = 1 + 2 * t.weight + u32::from((after > 0.0) == (before > 0.0));
         let scale = 1.0 / after;
         for y in y {
@@ -153,7 +153,8 @@ impl Band<'_> {
             let rank = 1 + 2 * weight + u32::from(area < 0.0);
             let scale = 1.0 / area;
             let (b0, b1, c0, c1) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
-            // Steps along a row. They are exact if the cell moves by whole pixels.
+            // Changes of the barycentric coordinates from each pixel of a row to the next. They are exact if the cell
+            // moves by whole pixels.
             let (along_u, along_v) = (-c0 * scale, b0 * scale);
             let px = f64::from(xs.start as i32) - a[1];
             let mut py = f64::from((ys.start + self.first) as i32) - a[0];
@@ -206,8 +207,8 @@ fn pixels(low: f64, high: f64, first: usize, count: usize) -> std::ops::Range<us
     start..(high.min(count as f64) as i32 as usize + 1).min(count)
 }
 
-/// Draws an output. `draw` is called with each band, and draws the triangles that reach its rows in
-/// their order.
+/// Draws an output in bands, and returns the source coordinates and the triangle number of each pixel. `draw` is
+/// called with each band, and must draw the triangles that reach its rows in order.
 pub(super) fn bands(
     shape: [usize; 2],
     monitor: &Monitor,
