@@ -50,7 +50,7 @@ def make_dask(reader: Reader, shape: object, chunks: object, axes: int, name: st
     sides = tuple(
         tuple(min(c, n - start) for start in range(0, n, c)) for n, c in zip(grid.shape, grid.chunks, strict=True)
     )
-    # Without a key, Dask chooses random names, because equal results cannot be recognised.
+    # Without a key, equal results cannot be recognised, so let Dask choose random names.
     token = tokenize(reader.key, grid.shape, grid.chunks, name) if reader.key else None
     shared = delayed(reader, name=None if token is None else f"texrs-reader-{token}", pure=True, traverse=False)
     return array.map_blocks(

@@ -192,7 +192,7 @@ def fill(
         said = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(stream, said)
         header = stream.getvalue()
-    # A reader without a key cannot be compared with an earlier run, so always begin again.
+    # If the reader has no key, it cannot be compared with the reader of an earlier run, so always begin again.
     of = reader.key or f"unknown {time.time_ns()}"
     # The record identifies the work in the first line of the journal.
     record: dict[str, Any] = {
@@ -234,7 +234,7 @@ def fill(
     try:
         with _name_journal(part).open("a", encoding="utf-8") as journal, answering(say):
             for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
-                # Force the line to the disk, so that a chunk counts only once it is recorded.
+                # Force the line to the disk, because a chunk counts as finished only once it is recorded.
                 journal.write(f"{number}\n")
                 journal.flush()
                 os.fsync(journal.fileno())
@@ -242,8 +242,8 @@ def fill(
                 say()
     except InvalidInput:
         if not done and not made:
-            # The work was refused before the first chunk, for example because no scheduler answers. There is nothing
-            # to continue.
+            # The work failed before the first chunk, for example because no scheduler answered. Remove the files,
+            # because they contain no chunk that could be kept.
             part.unlink(missing_ok=True)
             _name_journal(part).unlink(missing_ok=True)
         raise

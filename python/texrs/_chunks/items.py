@@ -75,7 +75,7 @@ def map_items(
         as_instance(key, "key", str)
     if not given:
         raise InvalidInput("items: must have at least one entry, got none")
-    # Continue an existing store only if the key, the arrangement and the version are the same.
+    # Continue an existing store only if the key, the shape of the item grid and the version are the same.
     lattice = (len(given),) if shape is None else _as_lattice(shape, len(given))
     record = {"version": __version__, "of": key or _digest(function, given), "items": list(lattice)}
     group = open_group(path, record, {}, overwrite=overwrite)
@@ -95,7 +95,7 @@ def map_items(
     def count(number: int, reason: str | None) -> None:
         nonlocal made
         if stopped:
-            # The progress function raised an exception. It is not the failure of an item.
+            # The progress function raised an exception. Raise it again, because it is not a failure of this item.
             raise stopped[0]
         if reason is None:
             made += 1

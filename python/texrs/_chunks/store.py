@@ -95,7 +95,7 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
 
     """
     zarr, name = import_zarr(), os.fspath(as_path(path))
-    # Convert the record as a round trip through JSON does, so that it can be compared with a stored one.
+    # Convert the record to JSON and back, so that it can be compared with a stored record.
     said = json.loads(json.dumps(dict(record)))
     try:
         if overwrite and os.path.isfile(name):
@@ -251,7 +251,7 @@ def write_image(
         for name, c in reader.maps.items()
     }
     if reader.key is None and not overwrite:
-        # A reader without a key cannot be compared with the existing store, so never continue one.
+        # If the reader has no key, it cannot be compared with the existing store, so never continue this store.
         record["of"] = f"unknown {time.time_ns()}"
     group = open_group(path, record, says[IMAGE] if alone else {}, overwrite=overwrite)
     # Create all arrays before the work begins, so that workers only write chunks.

@@ -117,7 +117,7 @@ _LEAVING = False
 def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
     """Initialise a worker process: store its task, and watch for a stop message or the end of the parent process."""
     global _WORK, _THREADS
-    # Ctrl-C reaches all processes of a terminal. The parent process decides how its workers end.
+    # Ignore Ctrl-C, which reaches all processes of a terminal, because the parent process ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
     set(**most)
@@ -138,8 +138,8 @@ def _heed(stop: Any) -> None:
     else:
         _thread.interrupt_main(signal.SIGTERM)
     late = time.monotonic() + GRACE
-    # After a stop message, the parent ends this process once it has cleaned up, so wait. Otherwise wait only for the
-    # cleanup.
+    # After a stop message, wait until the parent ends this process. If the parent has died, wait only until the
+    # running task has removed its partial files.
     while time.monotonic() < late and (told or _BUSY):
         time.sleep(0.01)
     os._exit(1)
@@ -149,7 +149,8 @@ def _leave(number: int, frame: Any) -> None:
     """Abort the running task so that it removes partial files. Later signals must not interrupt this."""
     global _LEAVING
     if not _BUSY:
-        # No file is half-written. Do not raise, because the pool would print the exception.
+        # End the process at once, because no task is running that could leave partial files. The pool would print an
+        # exception.
         os._exit(1)
     if not _LEAVING:
         _LEAVING = True
@@ -163,7 +164,8 @@ def _do(number: int) -> Any:
     global _BUSY
     assert _WORK is not None
     if _LEAVING:
-        # The aborted task has cleaned up, and the caller does not wait for further results.
+        # End the process, because the aborted task has removed its partial files and the caller does not wait for
+        # further results.
         os._exit(1)
     _BUSY = True
     try:
@@ -232,7 +234,7 @@ def _run_processes(
 
     def feed(place: int) -> None:
         while len(processes[place].tasks) < AHEAD:
-            # A process without own tasks takes the last task of the longest row.
+            # A process whose row is empty takes the last task of the longest row.
             row = rows[place] or max(rows, key=len)
             if not row:
                 return
@@ -315,8 +317,8 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
         raise InvalidInput(
             f"scheduler: must be None, a number of processes, an address or a distributed.Client, got {scheduler!r}"
         )
-    # A client that fails in its constructor is closed here. Otherwise the garbage collector closes it, and blocks
-    # forever if it runs while the next client holds the lock of the event loop.
+    # If the constructor of a client fails, close the client here. Otherwise the garbage collector closes it, and
+    # blocks forever if it runs while the next client holds the lock of the event loop.
     client = Client.__new__(Client)
     try:
         client.__init__(scheduler, timeout="10s", set_as_default=False)  # type: ignore[misc]
@@ -338,8 +340,8 @@ def _run_cluster(
 
     payload = pack(work)
     name = content_hash(payload, os.urandom(8)).hex()
-    # Submit the function as a task, not as scattered data: the cluster computes a task again for workers that join
-    # later.
+    # Submit the function as a task instead of scattered data, because the cluster computes a task again for workers
+    # that join later.
     there = client.submit(pickle.loads, payload, key=f"texrs-work-{name}")
     workers = list(client.nthreads().items())
     if not workers:
@@ -350,8 +352,8 @@ def _run_cluster(
     rows = [
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
-    # Slot, task numbers and ``alone`` of each submitted batch. A cluster blames all tasks that wait at a lost worker,
-    # so suspects are then run alone, with no other task submitted.
+    # For each submitted batch: its slot, its task numbers and ``alone``. A cluster blames all tasks that wait at a
+    # lost worker, so suspects are then run alone, with no other task submitted.
     known: dict[Any, tuple[int, list[int], bool]] = {}
     suspects: deque[tuple[int, int]] = deque()
     waiting = [0] * len(slots)
@@ -364,8 +366,8 @@ def _run_cluster(
         return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
 
     def submit(slot: int, some: list[int], alone: bool) -> None:
-        # A suspect task carries its function, and may run on any worker. A cluster that has lost all workers waits for
-        # lost data, and never moves tasks of a lost worker to a new one.
+        # Send the function together with a suspect task, so that any worker can run it. A cluster that has lost all
+        # workers waits for lost data, and never moves tasks of a lost worker to a new one.
         future = client.submit(
             _do_there,
             payload if alone else there,
@@ -402,7 +404,8 @@ def _run_cluster(
                 # Choose the batch size so that a batch takes about SHORT seconds.
                 at_once = max(1, min(MOST_AT_ONCE, int(len(some) * SHORT / max(seconds, 1e-6))))
             except KilledWorker as error:
-                # A task that loses its worker alone is to blame. Otherwise all tasks of the batch are suspects.
+                # If the task was run alone, it is to blame for the loss of its worker. Otherwise all tasks of the
+                # batch are suspects.
                 if not alone:
                     suspects.extend((slot, number) for number in some)
                     some = []

@@ -180,7 +180,7 @@ def blend(
     several = [as_ndarray(e, "exemplars") for e in as_list(exemplars)]
     result = source.render(several, interpolation=interpolation, antialias=antialias, map_type=map_type, green=green)
     shown = None if known is None else as_known(known, source.shapes)
-    # Values that cannot be interpolated are not corrected.
+    # Do not correct values that cannot be interpolated, such as labels.
     samples = Samples.scale([as_image(e) for e in several], map_type)
     if samples is None or interpolation == "nearest":
         return result
@@ -339,7 +339,7 @@ def _follow_light(source: SourceMap, exemplar: Array, how: RenderOptions, progre
     lights = measure_lights(pixels, parts)
     if all(light is None for light in lights):
         return _even_out(source, exemplar, how, "colour", "up", progress)
-    # Blend without light, then multiply the new pixels by the light of their part.
+    # Blend the images without their light, then multiply the new pixels by the light of their part.
     even = _even_out(source, divide_out(pixels, lights, parts), how, "colour", "up", progress)
     result = source.render(exemplar, interpolation=how.interpolation, antialias=how.antialias)
     shown = result.reshape((*source.shape, -1))

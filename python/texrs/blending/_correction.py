@@ -32,7 +32,7 @@ def solve_correction(
 
     With v = I + c, the target differences of c are g minus the differences of I. They are 0 except at seams.
     """
-    # Add the divergence of the missing differences: it is the right-hand side of the equations.
+    # Sum the divergence of the missing differences, which is the right-hand side of the equations.
     flow = np.zeros((*shape, channels.stop - channels.start), np.float32)
     near = np.zeros(shape if band is not None else (0, 0), bool)
     for seam in seen:

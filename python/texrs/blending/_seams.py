@@ -84,7 +84,7 @@ class Look:
         there, _ = self.look_beside(after, axis, 0)
         ahead, forward = self.look_beside(at, axis, 1)
         behind, backward = self.look_beside(after, axis, -1)
-        # Average the differences of both sources, as far as the exemplar has them.
+        # Average the differences in both sources. If one of them is outside the exemplar, use only the other.
         own = ((ahead - here) * forward[:, np.newaxis], (there - behind) * backward[:, np.newaxis])
         known = np.maximum(forward.astype(np.float32) + backward, 1)[:, np.newaxis]
         step = there - here

@@ -86,7 +86,7 @@ def measure_visibility(
     across = []
     # Sample a large image evenly, by bands of rows.
     for band in list(divide_rows(height))[:: -(-height * width // LOOK)]:
-        # Include the row after the band, which the differences across its end need.
+        # Include the row after the band, because the differences across the end of the band need it.
         last = min(band.stop + 1, height + cyclic[0])
         rows = wrap_rows(band.start, last, height)
         piece, shown = take_rows(source, rows), pixels[rows, :, :count]

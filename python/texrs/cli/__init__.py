@@ -129,7 +129,7 @@ def make_command(name: str) -> Any:
     ours = {p.name for p in (*limits, *forced)}
 
     def limited(**given: Any) -> None:
-        # The command checks before the work which existing files it can replace.
+        # Do not pass --force, because `Command` records it before the work for the checks of existing files.
         with limit(**{p.name: given[p.name] for p in limits}, quiet=given.get("quiet", False)):
             work(**{name: value for name, value in given.items() if name not in ours})
 

@@ -205,7 +205,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
         with name_arguments(scheduler="--scheduler", count="--threads"):
             for number, outcome in workers.run(work, range(total), who, threads_each=count, spare=True):
                 over += 1
-                # If a task ended its worker process, its result is only a text.
+                # If a task ended its worker process, the result is an error text instead of an `Outcome`.
                 one = outcome if isinstance(outcome, Outcome) else Outcome(str(outcome))
                 said, partly = one.said, partly + bool(one.ignored)
                 job, where = work.jobs[number], f"{number + 1} of {total}"

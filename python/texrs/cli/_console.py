@@ -110,7 +110,7 @@ def _run(work: Callable[[], object]) -> int:
         name = f"{error.filename}: " if isinstance(error.filename, str) else ""
         complain(f"{name}{(error.strerror or str(error)).lower()}")
         code = BAD_INPUT
-    except BaseException as error:  # Panics of the compiled part are not Exceptions.
+    except BaseException as error:  # Panics of the Rust code are not subclasses of Exception.
         if os.environ.get(TRACEBACK, "0") not in ("", "0"):
             traceback.print_exception(error)
         else:
@@ -165,7 +165,7 @@ def say_sizes(message: str) -> str:
 
     def turn(found: re.Match[str]) -> str:
         sides = [n.strip() for n in found[1].split(",")]
-        # The last number of a shape is the number of channels if it is small, because no volume has so few planes.
+        # If the last number of a shape is small, it is the number of channels, because no volume has so few columns.
         channels = sides.pop() if len(sides) > 2 and int(sides[-1]) <= MOST_CHANNELS else ""
         many = f" with {channels} channel{'s' if channels != '1' else ''}" if channels else ""
         return " x ".join(reversed(sides)) + many
@@ -241,7 +241,7 @@ def raise_on_signals() -> Iterator[None]:
     if threading.current_thread() is threading.main_thread():
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             number = getattr(signal, name, None)
-            # Keep ignoring signals that are ignored already, for nohup and for background jobs of scripts.
+            # If signals are already ignored, keep ignoring them: nohup and background jobs of scripts depend on this.
             if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
                 before[number] = signal.signal(number, stop)
     try:
@@ -307,7 +307,7 @@ def _describe_usage(failure: Exception) -> str:
         message = f"No such option: {wrong}{suggest(wrong, failure.possibilities or ())}"
     context = getattr(failure, "ctx", None)
     parameters = context.command.params if context is not None else ()
-    # Use the name of the argument. Fields of a parameter are joined to its name, so "mask_marks" is MASK.
+    # Use the names of arguments in the help: the parameter "mask_marks" is the argument MASK.
     placed = [p.name.removesuffix("_marks") for p in parameters if p.param_type_name == "argument"]
     if context is not None and wrong is not None and wrong.lstrip("-").replace("-", "_") in placed:
         usage = " ".join(name.upper() for name in placed)

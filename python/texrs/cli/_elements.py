@@ -89,7 +89,7 @@ def analyse_command(
         entry = analyse(**PICTURED.call(options), progress=progress)
         if given["similarity"]:
             entry = entry.with_similarity()
-    # Write the analysis, and then the pictures of its stages and the page.
+    # Write the analysis, then the pictures of its stages, and then the HTML page.
     with _outputs.write_output(out) as temporary:
         entry.save(temporary)
     if stages is not None:

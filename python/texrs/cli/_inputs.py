@@ -169,7 +169,7 @@ class _Found:
             inside = os.path.normpath(folder or ".")
             above = os.path.dirname(os.path.relpath(inside, base)) if base != folder else ""
             name = os.path.basename(os.path.abspath(inside))
-            # List the files of the material if the folder also contains other inputs, because it would be read as a
+            # If the folder also contains other inputs, list the files of the material, because a folder is read as a
             # whole.
             deeper = any(path.startswith(os.path.join(folder, "")) for path in self.files if path not in paths)
             text = join_braces(paths) if deeper else folder
@@ -177,8 +177,8 @@ class _Found:
             return
         taken = {path: key for key, own in materials.items() for path in own}
         for path in paths:
-            # Assign a file to a material if its name begins with the name of the material. The reader reports unknown
-            # maps.
+            # Assign a file to a material if its name begins with the name of the material. This includes unknown maps,
+            # because the reader reports them.
             starts = [k for k in materials if k and re.match(rf"{re.escape(k)}[_\-. ]", stems[path])]
             if path not in roles and starts:
                 taken[path] = max(starts, key=len)

@@ -76,7 +76,7 @@ class Option:
 
     def make_parameter(self) -> inspect.Parameter:
         """Return the parameter that defines this option for typer."""
-        # A value without a default can be None, which typer must accept.
+        # An option that is not required can be None, which typer must accept.
         annotation: Any = Annotated[self.type if self.default is MISSING else self.type | None, self.info]
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
 
@@ -214,7 +214,7 @@ class Options:
         elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
-        # Do not show the word default, because it does not describe the default.
+        # Do not show "[default: default]", because it does not describe the value.
         shows = flag.startswith("--") and bool(shown) and default != "default"
         # If the command describes its own default, drop the sentence about the default of the function.
         stated = MISSING if self.optional.get(name) else parameter.default
@@ -225,7 +225,7 @@ class Options:
         )
         help_ = " ".join(t for t in texts if t)
         if kind is not None and PLACES.search(kind.pick(kind.metavar, self.axes)):
-            # Drop the order of coordinates from the description, because texts have the x or the width first.
+            # Drop the order of coordinates from the description, because x or the width is first on the command line.
             help_ = re.sub(r" \((?:plane, )?row, column\)| \((?:planes, )?rows, columns\)", "", help_)
             help_ = help_.replace("Plane, row and column", "Place")
         if not flag.startswith("--"):
@@ -234,7 +234,7 @@ class Options:
             both = f"{flag}/--no-{flag.removeprefix('--')}" if type_ is bool else flag
             metavar = kind.pick(kind.metavar, self.axes) if kind else None
             panel = path[0].replace("_", " ").capitalize() if len(path) == 2 else None
-            # Do not show the word default, because the text describes the default.
+            # Do not show "[default: default]", because the text of the option describes the default.
             shown = False if default == "default" else shown
             info = typer.Option(both, metavar=metavar, help=help_, show_default=shown, rich_help_panel=panel)
         return Option(path, flag, type_, kind, default, required, info)

@@ -272,8 +272,8 @@ def check_output(
         if like is None:
             temporary.touch()
         else:
-            # Use the length of the result, which some formats limit, and the least value, which .hdr can reject.
-            # Images of unknown pixels can have any values.
+            # Use the longest side of the result, because formats limit it, and the minimum value, because .hdr rejects
+            # negative values. Ignore NaN, which can mark unknown pixels.
             axes = len(size)
             longest = min(max(size), LONGEST_PROBE)
             least = np.nan_to_num(np.fmin.reduce(like, axis=None))
@@ -360,7 +360,7 @@ def name_arguments(**names: str) -> Iterator[None]:
             raise
         called = dict.fromkeys(names.get(each, as_flag(each)) for each in several)
         said = say_places(rest) if set(several) & set(PLACED) else rest
-        # The text can name other arguments as well. Only replace names with an underscore, because others can be
+        # Also replace other argument names in the text, but only names with an underscore, because others can be
         # ordinary words.
         for other in (name for name in names if "_" in name):
             said = re.sub(rf"\b{other}\b", names[other], said)
@@ -405,7 +405,7 @@ def deliver(
     image, axes = np.asarray(result.image), result.source_map.axes
     suffix = find_suffix(Path(out))
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
-    # Move the result to its name last, after all other files are written.
+    # Give the result its final name only after all other files are written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
         if axes == 2:
             palette = None if like is None else like.palette

@@ -184,7 +184,7 @@ def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> No
 
 def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
     """Return why four points cannot be the corners of a convex quadrilateral in an image, or an empty text."""
-    # Corners are placed by hand, so allow a pixel beyond the border.
+    # Corners are placed by hand, so allow one pixel beyond the border.
     outside = ((points < -1) | (points > np.asarray(size[:2]))).any(axis=1)
     if outside.any():
         return f"{outside.sum()} of the four leave the image"

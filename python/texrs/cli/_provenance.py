@@ -110,7 +110,7 @@ class Record:
         real = self.places[text]
         try:
             return Path(os.path.relpath(real, folder)).as_posix()
-        except ValueError:  # The file is on another drive on Windows.
+        except ValueError:  # On Windows, a file on another drive cannot have a relative path.
             return Path(real).as_posix()
 
     def tell(self, target: str, *, output: str = "out", inside: bool = False, suffix: str = "") -> str:
@@ -190,7 +190,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
-    # Options in a batch can contain places for any command.
+    # The options of a batch can contain places, because they can be for any command.
     placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)
@@ -211,13 +211,14 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     shared = any(given.get(name) is not None for name in ("workers", "scheduler"))
     if shared and given.get("origin", "") is None and given.get("chunks") is None:
-        # Record that the result is part of an unbounded texture, because this changes it. The scheduler does not.
+        # Workers and schedulers are not recorded, but they make the result a part of an unbounded texture. Record this
+        # as an origin.
         options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
     names = [split_tail(name)[0] for name in names]
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]
-    # Only maps of a material in a folder are inputs. A batch reads all images.
+    # From a folder, only the maps of a material are inputs. A batch is an exception, because it reads all images.
     every = command.name == "batch"
     inside = [f for name in stacks for f in (list_folder(name) if every else list_maps(name, said))]
     files |= {f: status for f in inside if (status := read_status(f)) is not None}

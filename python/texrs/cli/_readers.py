@@ -220,7 +220,7 @@ def read_target(text: str) -> Any:
     except FileError:
         if Path(text).suffix.lower() not in (".npy", ".npz"):
             raise
-        # Read four axes as Jacobians.
+        # The file has four axes, so read it as Jacobians.
         return io.read_volume(text)
     if values.ndim == 3 and values.shape[2] == 2:
         return values

@@ -103,7 +103,7 @@ class Recipe:
         if None in self.arguments:
             return words
         if self.output not in ("--out", "--sheet"):
-            # Give the result a name as well, because the command always writes it.
+            # Give the main result a name as well, because the command always writes it.
             words += ["--out", os.path.join(folder, f"result{self.suffix or '.npz'}")]
         return [*words, self.output, target]
 
@@ -136,7 +136,7 @@ class Recipe:
         if wrong:
             raise InvalidInput(f"{self.path}: cannot be made again: {'; '.join(wrong)}")
         for text in (*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))):
-            # A record names all files of a folder of maps.
+            # A record lists the maps in a folder but not the folder, so find the folder of its maps.
             inside = [found[name] for name in self.inputs if isinstance(text, str) and os.path.dirname(name) == text]
             if inside and text not in found:
                 found[str(text)] = os.path.dirname(inside[0])
@@ -255,7 +255,7 @@ def info_command(
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
         say(line)
-    # Print the metadata that images can have.
+    # Print the metadata of the image.
     notes = io.read_metadata(file)
     if notes.profile is not None:
         say(f"colours: ICC profile of {len(notes.profile)} bytes")
@@ -282,7 +282,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
     if not os.path.isfile(file):
         io.read(file)
     suffix = Path(file).suffix.lower()
-    # Formats that are not arrays are described by their own functions.
+    # Describe files that do not contain arrays.
     if suffix in (".html", ".json") and recipe is not None:
         return [f"{'page' if suffix == '.html' else 'report'}: {os.path.getsize(file)} bytes"]
     if suffix == ".stl":

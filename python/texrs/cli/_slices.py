@@ -153,7 +153,7 @@ def slice_command(
             f"--out: must {'not end in .gif without' if moving else 'end in .gif with'} --turntable, got {out!r}"
         )
     _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube or as_clear else None)
-    # Read the volume after all checks, and resample it to cubes.
+    # Read the volume after all checks, and resample it to cubic voxels.
     voxels = read_volume(volume)
     length = voxels.shape[:3]
     if spacing is None:

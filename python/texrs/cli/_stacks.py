@@ -184,7 +184,8 @@ class Stack:
         """Write the maps of a result, and its additional outputs."""
         material, out = result.material, paths["out"] or ""
         assert material is not None
-        # Write the other outputs first, because the files of the folder replace existing ones together.
+        # Write the additional outputs first, so that the maps in the folder replace the existing files last and
+        # together.
         _outputs.deliver_beside(result, paths, Path(out).suffix or "/", made)
         if Path(out).suffix.lower() == LAYERED:
             with _outputs.write_output(out, option, inside=option != "out", made=made) as place:
@@ -196,7 +197,8 @@ class Stack:
             with _outputs.write_output(shown, "preview", made=made) as place:
                 io.write(place, material.preview())
         if (solid := paths.get("gltf")) is not None:
-            # Name the material in the file after the final file, not after the temporary one.
+            # Write the file under its final name in a temporary folder, because this name becomes the name of the
+            # material.
             with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as beside:
                 material.save_gltf(file := Path(beside, Path(solid).name))
                 shutil.copyfile(file, place)

@@ -130,7 +130,7 @@ def read_steps(text: str, about: About) -> Any:
     if not text.lower().endswith(".json") and not text.lstrip().startswith(("[", "{")):
         return [word.strip() for word in text.split(",")]
     found = read_json(text, about.option)
-    # A report contains its edit under a key.
+    # A report contains its edit under the key "edit".
     return found["edit"] if isinstance(found, dict) and "edit" in found else found
 
 

@@ -89,7 +89,7 @@ class Verb:
         parameters += [o.make_parameter() for o in self.options if not o.argument]
         if self.several is not None:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
-        # Only images can be maps of a material.
+        # Only commands for images can write a material.
         stacked = self.options.axes == 2
         for name in ("source_map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))

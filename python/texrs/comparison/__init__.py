@@ -125,7 +125,7 @@ def compare(
     named = check_programs(programs or {})
     given = {name: take_middle(image, side, name) for name, image in pictures.items()}
     holes = {name: make_hole(image.shape[:2]) for name, image in given.items()} if "hole" in chosen else {}
-    # List the methods before the work starts, so that progress has a known total.
+    # List the methods before the work starts, because the progress needs their number.
     here, missing = [], []
     for method in METHODS:
         if method.task in chosen:
@@ -187,7 +187,7 @@ def attempt(do: Callable[[Request], Array], request: Request) -> tuple[Array | N
     try:
         made = do(request)
     except Exception as error:
-        # Other programs may raise any exception. The comparison continues.
+        # Continue the comparison after any exception, because other programs can raise exceptions of any class.
         return None, count_seconds() - start, (str(error).strip().splitlines() or [type(error).__name__])[0][:160]
     seconds = count_seconds() - start
     made = np.ascontiguousarray(made)

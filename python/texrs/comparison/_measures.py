@@ -92,7 +92,7 @@ def find_echo(image: Array) -> float:
     other = correlate(ones, np.asarray(detail) ** 2)
     rows, columns = (np.minimum(np.arange(2 * n), 2 * n - np.arange(2 * n)) for n in (height, width))
     far = np.maximum(rows[:, np.newaxis] / height, columns / width)
-    # Require an overlap of at least a quarter of the image, or chance decides.
+    # Require an overlap of at least a quarter of the image, because correlations of small overlaps are random.
     area = (height - np.minimum(rows, height))[:, np.newaxis] * (width - np.minimum(columns, width))
     allowed = (far > NEAR) & (area >= height * width / 4)
     alike = common / np.maximum(np.sqrt(np.maximum(energy, 0) * np.maximum(other, 0)), 1e-9)

@@ -36,7 +36,7 @@ def make_page(
 ) -> str:
     """Return a self-contained HTML page."""
     links, parts = [("about", "What is compared")], [section("about", "What is compared", INTRO, explain(timed))]
-    # Each task that was done has a section, with a table and the images.
+    # Add a section with a table and the images for each task that has results.
     for task, about in TASKS.items():
         some = [r for r in results if r.task == task]
         if some:

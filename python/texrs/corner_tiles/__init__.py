@@ -129,14 +129,14 @@ class CornerTiles(InParts):
                 given, as_int(variants, "variants", 1, 64), 2 * tile_size, seed=seed, progress=watch, **options
             )
         )
-        # Cuts through elements cost more, the deeper inside they are.
+        # Increase the cost of cuts through elements with the depth inside the element.
         depth = _measure_depth(known)
         costs = [np.asarray(KEEP * each.source_map.render(depth, interpolation="linear"), np.float32) for each in made]
         pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
         step = find_step(list(pictures.images), known.segment().lattice, tile_size)
         tiles = cut_tiles(pictures, tile_size, step, self._seed, advance or (lambda share: None))
-        # Arrange the tiles on the torus, where each is once, and store where each number is.
+        # Arrange the tiles on the torus, which contains each tile once, and store the position of each tile number.
         around = np.pad(TORUS, (0, 1), mode="wrap")
         order = number_tiles(around)
         self._place: NDArray[np.intp] = np.empty(TILES, np.intp)
@@ -150,7 +150,8 @@ class CornerTiles(InParts):
         else:
             self._maps[IMAGE] = pictures.look(laid)
         self._like = materials[0] if materials else None
-        # The atlas is a look-up into the designs, which are look-ups into the exemplar. Compose the two.
+        # Combine the source map from the atlas into the designs with the source maps from the designs into the
+        # exemplar.
         outer = SourceMap(
             laid[..., 1:].astype(np.float32),
             laid[..., 0].astype(np.uint16),
@@ -279,7 +280,7 @@ class CornerTiles(InParts):
         """
         watch = stage(listen(progress), "window")
         start, sides = self._as_origin(origin), as_size(size, way=LARGER)
-        # A dense Jacobian is cut like the other arrays. A table by label stays whole.
+        # Cut a Jacobian per pixel like the other arrays, but keep a table of Jacobians by label complete.
         source = self._source
         jacobian = source.jacobian_array()
         names, dense = list(self._maps), jacobian is not None and jacobian.ndim > 3
@@ -359,7 +360,7 @@ class CornerTiles(InParts):
         for name, array in self._maps.items():
             written.append(where / f"{name}.{'tif' if array.dtype.kind == 'f' else 'png'}")
             write(written[-1], array)
-        # Shaders wrap around, so the corners at the far ends must equal the corners at the near ends.
+        # Shaders repeat the index texture, so its last corners along each axis must equal its first corners.
         colours = draw_colours(self._seed, *(np.arange(n, dtype=np.int64) for n in sides))
         around = number_tiles(np.pad(colours, (0, 1), mode="wrap"))
         written.append(where / "index.png")

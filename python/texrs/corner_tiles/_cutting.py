@@ -53,7 +53,8 @@ def cut_tiles(
     for number in range(TILES):
         nw, ne, sw, se = number // 27, number // 9 % 3, number // 3 % 3, number % 3
         ring = np.zeros((side, side, 3), np.int32)
-        # Half of each strip is on either side of its edge. Strips of axis 1 run across.
+        # Each strip extends to both sides of an edge, so use the half inside the tile. Strips of axis 1 are
+        # horizontal.
         ring[:half] = edges[1, nw, ne][half:]
         ring[-half:] = edges[1, sw, se][:half]
         ring[half:-half, :half] = edges[0, nw, sw][half:-half, half:]
@@ -77,7 +78,7 @@ def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, co
         return values if axis else values.swapaxes(0, 1)
 
     middle = side // 2
-    # Near a corner the strip is that of the corner. In the parts between, a window is cut into both corners.
+    # Copy the ends of the strip from its two corners. Between them, cut in a window that has a seam to each corner.
     ends = np.concatenate([look(corners[0], 0, middle), look(corners[1], -middle, middle)], axis=1)
     known = np.zeros(ends.shape[:2], bool)
     known[:, half : side - half] = True

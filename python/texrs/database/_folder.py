@@ -182,7 +182,7 @@ class Folder:
                     self._made = True
                 return os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
             except FileNotFoundError:
-                # Another process removed the folder in between.
+                # Another process removed the folder after it was created, so try again.
                 continue
             except OSError as error:
                 raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None

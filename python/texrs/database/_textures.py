@@ -215,7 +215,7 @@ class TextureDatabase:
             raise InvalidInput(
                 f"{unknown[0]}: is not an option; must be one of {', '.join(sorted(AnalyseOptions.__annotations__))}"
             )
-        # Use the name of the file, if no name is given, after checking that it is a valid name.
+        # If no name is given, use the name of the file if it is valid.
         file = os.path.abspath(os.fspath(image)) if isinstance(image, str | os.PathLike) else None
         if name is None:
             if file is None:

@@ -17,7 +17,7 @@ def _samples(workshop: Workshop) -> str:
     names = samples.names()
     for i, name in enumerate(names):
         workshop.watch(i / len(names))
-        # A sample does not say whether it is a volume, so try two axes first.
+        # The list of samples does not separate images and volumes, so try two axes first.
         try:
             sample = samples.load(name, size=(SIDE, SIDE))
         except ValueError:

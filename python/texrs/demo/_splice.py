@@ -37,7 +37,7 @@ def _splice(workshop: Workshop) -> str:
         elements = _load_entry(a)
         made = self_splice(elements, edit, seed=1)
         edited.append(card([figure(elements.image, a)], figure(made.image, str(edit["op"]), note=note)))
-    # Drawn layouts do not need an image of their own.
+    # Also show layouts that are generated from points and do not have an image.
     for a, layout, words in (
         ("bricks", courses(SIDE, [24, 40], 60, shift=1 / 3, vary=0.4, seed=2), "courses"),
         ("dots", lattice(SIDE, (0, 40), (34, 14)), "a lattice"),

@@ -237,7 +237,8 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
     frames = np.empty((*unit.shape, axes))
     frames[..., along] = unit
     if axes == 2:
-        # Turn the other column by a quarter turn, in the sense that does not mirror the texture.
+        # Rotate the direction by a quarter turn to get the other column, in the sense that does not mirror the
+        # texture.
         turned = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
         frames[..., 1 - along] = turned if along == 0 else -turned
         return frames
@@ -253,7 +254,7 @@ def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> ND
                 f"up: must be one nonzero vector of shape (3,), or nonzero vectors of shape {unit.shape}, got {up!r}"
             )
         upwards = upwards.reshape(-1, 3) / np.sqrt((upwards.reshape(-1, 3) ** 2).sum(axis=1, keepdims=True))
-    # If a direction is parallel to up, use the axis least parallel to it instead.
+    # If a direction is parallel to up, use the axis least parallel to it instead of up.
     spare = np.eye(3)[np.abs(flat).argmin(axis=1)]
     near = np.abs((flat * upwards).sum(axis=1)) > 0.999
     wanted = np.where(near[:, np.newaxis], spare, upwards)

@@ -47,7 +47,7 @@ class Wound(Field):
         at = (0.0,) * self.axes if self.centre is None else self.centre
         out = points[:, self.radial] - at[self.radial]
         along = points[:, self.tangential] - at[self.tangential]
-        # Use quotients and roots, because sines of angles could differ in the last bit between vectorised loops.
+        # Use quotients and roots, because the last bits of sines can depend on how a loop is vectorised.
         far = np.maximum(np.abs(out), np.abs(along))
         middle = far == 0
         far = np.where(middle, 1.0, far)

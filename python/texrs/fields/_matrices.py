@@ -77,7 +77,7 @@ def inverses(m: Matrices) -> tuple[Matrices, Numbers]:
     det = determinants(m, c)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         c /= det
-    c += 0.0  # Negative zeros become positive.
+    c += 0.0  # Turn negative zeros into positive zeros.
     return transpose_each(c), det
 
 

@@ -228,7 +228,7 @@ def grow(
         found = correct(places, level, here, jacobians, asked, progress)
         places, before = found.places, here
         patches = patches if found.passes == 0 and level == start.level else None
-        # Levels coarser than the exemplar's coarsest one have no image.
+        # Do not show levels coarser than the exemplar's coarsest level, because they have no image.
         if show is not None and 0 <= level < levels - 1:
             stages[f"level {level + 1}"] = show(places, here, spacing)
         done.append(LevelDone(here.shape, found.passes, found.changed))

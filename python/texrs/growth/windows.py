@@ -123,7 +123,7 @@ class Windows:
             coherence=s.coherence,
             vote=min(step.vote, here.radius),
             settled=s.settled,
-            # Each level has its own random numbers.
+            # Derive a seed from the level, so that levels use different random numbers.
             seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
             held=asked.held,
             demand=asked.demand,

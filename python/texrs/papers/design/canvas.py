@@ -78,8 +78,8 @@ class Canvas(Draft):
         rest = np.isin(labels, sorted(still))
         covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         hard: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(INNER), border_value=1)
-        # If elements are separate, elements that have not moved yet also occupy their pixels. Each element can then
-        # stay in its own place.
+        # If elements are separate, reserve the pixels of elements that have not moved yet, so that each of them can
+        # still stay in its place.
         occupied = labels.copy() if free else np.where(hard, labels, 0)
         return cls.start(picture, mirror, covered, hard, occupied)
 
@@ -111,7 +111,7 @@ class Canvas(Draft):
     def stitch(self, picture: Floats, labels: Labels, placement: Placement, element: int) -> None:
         """Stitch an element and its context band into the canvas along a minimum cut (Eq. 3)."""
         window, hard = placement.window, placement.hard
-        # Offer only background from the surroundings, because parts of other elements would look torn.
+        # Around the element, offer only background pixels, because parts of other elements would look torn.
         ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
         offered = ((placement.distance > -1) | ((placement.distance > -CONTEXT) & ground)) & placement.inside
         colours = gather(picture, placement.coordinates, interpolation="cubic")
@@ -119,8 +119,8 @@ class Canvas(Draft):
         taken = offered
         if (offered & known).any():
             old_hard = self.hard[window] & known & ~hard
-            # Do not divide costs by the local gradient. Seams would follow strong edges, and leave parts of these
-            # edges visible.
+            # Do not divide costs by the local gradient, because seams would then follow strong edges and leave parts
+            # of these edges visible.
             seam = cut(self.colours[window], colours, known, offered, core_a=old_hard, core_b=hard, cost="paper")
             taken = seam.mask & offered
         self.colours[window][taken] = colours[taken]

@@ -73,7 +73,7 @@ def lay_sheets(
     heights = courses.heights[order]
     # A texture that does not wrap begins at a random height within its first course.
     ends = np.concatenate([[0.0], np.cumsum(heights * (size / heights.sum() if wrap else 1.0))])
-    # Find for each row of the texture its course, and its relative height within this course.
+    # For each row of the texture, find its course and its relative height within this course.
     rows = np.arange(size + beyond) + 0.5
     rows = rows % size if wrap else rows + uniform(seed, 0, 0, 1, 7) * heights[0]
     laid = np.minimum(np.searchsorted(ends, rows, side="right") - 1, len(order) - 1)
@@ -101,7 +101,7 @@ def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int
     """Return course numbers that fill a size: in the exemplar's order, and after its end from a random course on."""
     found: list[tuple[float, list[int]]] = []
     for attempt in range(TRIES if wrap else 1):
-        # A texture that begins within a course needs one more course.
+        # A texture that does not wrap can begin within its first course, so it needs one more course.
         order: list[int] = []
         missing = size if wrap else size + heights.max() + 1
         at = int(uniform(seed, attempt, 0, 0, 7) * len(heights))

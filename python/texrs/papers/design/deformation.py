@@ -78,7 +78,7 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
     elements, arrangement = measure_elements(labels), classify(parts)
     resting, full = choose_resting(arrangement, parts.count, seed, tile), arrangement in ("heap", "full")
     heap = Heap.measure(elements, labels) if arrangement == "heap" else None
-    # In a full arrangement, the image stays below the elements, so holes do not occur.
+    # If the elements form a heap or fill the image, leave the exemplar below them, so that no holes occur.
     canvas = (
         Canvas.start_on_picture(picture, mirror)
         if full
@@ -102,8 +102,8 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         canvas.log.append(describe(mover, operations, full=full))
         if operations or not full:
             canvas.stitch(picture, labels, placement, mover.label)
-        # Open the uncovered rest of the replaced element, if holes are filled with background only. Patches with parts
-        # of other elements would tear it again.
+        # If holes are filled with background only, make the visible rest of the replaced element a hole. Otherwise
+        # patches with parts of other elements could replace it, and would look torn.
         if heap is not None and plan.pure:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
     return canvas
@@ -119,7 +119,7 @@ def describe(element: Element, operations: Sequence[Operation], *, full: bool) -
     """Return the log entry of an element that was moved."""
     if not full:
         return {"element": element.label, "operations": [o.describe() for o in operations]}
-    # The translation to the place of another element is not an operation of the element itself.
+    # Leave out the translation to the place of another element, because the log contains it as "place".
     own = [o.describe() for o in operations if o.kind != "T"]
     place = [round(sum(o.shift()[axis] for o in operations)) for axis in range(2)]
     return {"element": element.label, "operations": own, "place": place}

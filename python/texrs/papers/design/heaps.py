@@ -86,8 +86,8 @@ class Heap:
             shift = np.round(place_of.centre - other.centre)
             operations += [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
             for attempt in range(TRIES if count > 1 else 1):
-                # The added changes come first and keep the centre of the element, so they do not alter its target
-                # place.
+                # Apply the random changes before the translation. They keep the element's centre, so the element still
+                # moves to its target place.
                 changed = [*moves.draw_changes(values, count - 1, 1 - attempt / TRIES), *operations]
                 placement = place(other, changed, self.labels.shape)
                 if placement is not None and self.fills(placement, place_of):

@@ -148,7 +148,7 @@ def stitch_layers(
         taken = offered
         if (offered & made.covered).any():
             taken = offered & cut(made.colours, colours, made.covered, offered, cost="paper").mask
-        # Where layers overlap, the cut decided which pixels the new layer takes.
+        # Copy the pixels that only this layer covers, and in overlaps the pixels that the cut gave to it.
         made.colours[taken] = colours[taken]
         made.coordinates[taken] = places[taken]
         made.label[taken] = layer

@@ -172,10 +172,10 @@ def cut_borders(
         asked = price + step * found
         costs = np.where(far, FORBIDDEN, pull * squares + asked[:, np.newaxis, np.newaxis]).astype(np.float32)
         chosen = np.zeros(wanted.shape, np.uint16)
-        # With two layers the first cut is optimal. With more layers, each layer is tried against all others.
+        # With two layers, one cut is optimal. With more layers, cut each layer against all others in turn.
         for which in range(1, count) if count == 2 else [*range(1, count), *range(count)]:
             chosen = cut_in(which, chosen, ends, costs, wrap)
-        # Keep the best round. If the error grows, try smaller changes of the costs.
+        # Keep the round with the smallest error. If the error grows, try smaller changes of the costs.
         got = np.bincount(chosen.ravel(), minlength=count) / size
         error = measure_error(got, due)
         if error < off:

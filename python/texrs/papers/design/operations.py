@@ -120,7 +120,7 @@ class Moves:
         while True:
             start = 2 * uniform(seed, tile, element, attempt, 2) - 1
             if options.start is not None:
-                # The burn-in separates starts that differ by 1e-8.
+                # Start close to the given value, because the burn-in separates starts that differ by only 1e-8.
                 near = options.start * (1 - 1e-6 * (start + 1))
                 start = near if (tile, element) != (0, 1) or attempt else options.start
             try:

@@ -82,8 +82,8 @@ def make_plan(
 def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
     """Return the permitted mirror images: as requested, or by default all that look like the exemplar."""
     if options.allow_mirror is None:
-        # A user who forbids rotation knows that the example has an upper side, light or letters. The statistics can
-        # miss them.
+        # If rotation is forbidden, do not mirror by default: the example can have an upper side, light from one side
+        # or letters, which the statistics can miss.
         return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 
@@ -97,8 +97,8 @@ def settle_moves(
         shifts = parts.lattice.shifts(options.translate * min(exemplar.shape)) if options.translate else []
         return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), tuple(shifts), axes)
     if parts.kind == "grid":
-        # Cells are not elements. A turned or scaled cell would show its outline, and a mirrored cell would meet the
-        # mirror image of its content.
+        # Only translate the cells of a grid. A rotated or scaled cell would show its outline, and a mirrored cell
+        # would adjoin the mirror image of its content.
         return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), allow_mirror=False), (), axes)
     if options.rotate is None:
         options = replace(options, rotate=ROTATE if exemplar.anisotropy < DIRECTED else 0.0)

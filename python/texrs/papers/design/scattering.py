@@ -310,7 +310,7 @@ class Room:
         # Exclude cells where elements were not requested, and cells that elements above cover.
         open_ = np.isfinite(self.wanted) & (self.free > 0)
         lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), AROUND / CELLS, mode=self.mode)
-        # If a cell is too full to reach its density, its missing elements must not go to cells that need none.
+        # If a cell has no room for the elements that it lacks, do not place them in cells that lack none.
         wanting = np.where(open_, np.maximum(lack, 0), 0)
         self.lack = np.cumsum(wanting if wanting.any() else open_.astype(np.float64))
 

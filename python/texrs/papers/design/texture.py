@@ -54,7 +54,7 @@ def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Argume
         [measure_layer(source, plan) for source, plan in zip(each, plans, strict=True)],
         arguments.shares,
         extent=min(max(LEAST, float(np.mean([measure_extent(plan) for plan in plans]))), min(arguments.size) / 4),
-        # Smaller territories follow a map of shares more closely.
+        # With a map of shares, halve the territories, because smaller territories follow the map more closely.
         territory=min(TERRITORY * side / (2 if arguments.shares.ndim > 1 else 1), min(arguments.size) / 2),
         wrap=arguments.wrap,
         seed=seed,

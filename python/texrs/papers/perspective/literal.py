@@ -204,8 +204,8 @@ class Search:
             found.append(self.tree.query(query[part : part + AT_ONCE]))
         distance, near = (np.concatenate(each) for each in zip(*found, strict=True))
         square = np.maximum(distance**2, self.least)
-        energy = float((square ** (R / 2)).mean())  # Eq. 5
-        omega = square ** ((R - 2) / 2)  # Eq. 6
+        energy = float((square ** (R / 2)).mean())  # Energy of Eq. 5.
+        omega = square ** ((R - 2) / 2)  # Weights of Eq. 6.
         rows, columns = (_find_starts(n, SPACING) for n in x.shape[:2])
         top, left = (v.reshape(len(rows), len(columns)) for v in np.divmod(self.first[near], self.columns))
         omega = omega.reshape(len(rows), len(columns))
@@ -216,9 +216,9 @@ class Search:
             for dx in range(SIDE):
                 ask()
                 colour = self.e[top + dy, left + dx]
-                w = omega / (1 + _add_excess(excess, colour))  # Eq. 8
+                w = omega / (1 + _add_excess(excess, colour))  # Weight of Eq. 8.
                 here = np.ix_(rows + dy, columns + dx)
-                total[here] += w[..., np.newaxis] * colour  # Eq. 7, minimised
+                total[here] += w[..., np.newaxis] * colour  # Minimum of Eq. 7.
                 weight[here] += w
                 better = w > best[here]
                 best[here] = np.where(better, w, best[here])

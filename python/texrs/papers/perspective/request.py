@@ -120,7 +120,7 @@ class Request:
     ) -> Request:
         """Return the checked arguments of a call, or raise an error."""
         known = as_exemplar(exemplar, minimum=LEAST)
-        # Do cheap checks before measurements.
+        # Check arguments before the exemplar is measured, because measurements take longer.
         strength = as_float(scale_weight, "scale_weight", 0, 16)
         as_method(method, None, "paper")
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
@@ -144,7 +144,7 @@ class Request:
             raise InvalidInput(
                 "method: cannot be combined with surfaces or directions; give a scale map as target, or omit the method"
             )
-        # Determine the scale map, and resize the target to the result.
+        # Determine the scale map, and resize the target to the size of the result.
         plane, scale, measured = find_scale(known, scale_map, scale_measurement)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said

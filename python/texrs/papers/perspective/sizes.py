@@ -46,7 +46,7 @@ def check_sizes(asked: object) -> tuple[float, ...] | None:
         return None
     if isinstance(asked, Sequence) and not isinstance(asked, str) and 1 <= len(asked) <= 16:
         sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
-        # The exemplar itself is always included.
+        # Always include size 1, the exemplar itself.
         return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
     raise InvalidInput(f"augment_scales: must be 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
 

@@ -67,7 +67,7 @@ def lay_out(asked: Request) -> PreparedExemplar:
     if plane is None:
         target, sheet = wanted, Copies.of(colours, asked.scale, sizes, wanted)
     else:
-        # If the exemplar shows a plane, scales are widths from here on.
+        # If the exemplar shows a plane, convert the target from scales to widths, which the flattened sheet requires.
         target = power_single(wanted, plane.power)
         sheet = Flattened.of(colours, plane, target)
     frames = None if asked.turn is None else sheet.frames(target, asked.wrap, asked.turn)
@@ -80,7 +80,7 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
     front = plane is None and is_frontal(asked)
     scale, target, power = asked.scale, asked.target, 1.0
     if plane is not None:
-        # Elements on a plane have an area for each width. Request the width with the requested area.
+        # On a plane, the area of an element determines its width, so convert the requested areas to widths.
         scale, power = power_single(scale, plane.power), 1.5
         target = np.cbrt(areas * areas * (plane.scale / plane.lean)).astype(np.float32)
     sizes = (1.0, SMALLEST, LARGEST) if front else choose_sizes(scale, target, asked.sizes, plane)
@@ -119,6 +119,6 @@ def find_slope(asked: Request, colours: Floats) -> Slope | None:
     found = find_plane(colours, asked.scale, asked.kinds[0])
     if found is None:
         return None
-    # Lengths cannot be derived from a map of widths alone, but also need the angle of view.
+    # A map of widths does not determine lengths along the slope, which also depend on the angle of view.
     lean = cos(atan(found.slope / found.scale * find_focal(asked.exemplar.shape, asked.fov)))
     return replace(found, lean=lean)

@@ -142,7 +142,8 @@ class Ground:
             frame = along[centre[axis] - low[axis]]
             apart.append(float(_measure(along - frame).max()))
             jumps = _measure(np.diff(along, axis=0))
-            # Cut at a fold if there is one. Otherwise frames change little from one voxel to the next.
+            # Divide the box where the field has a fold, or at its centre if frames change little from each voxel to
+            # the next.
             sharp = len(jumps) > 0 and jumps.max() > 0.5 * BENT
             folds.append(low[axis] + 1 + int(jumps.argmax()) if sharp else centre[axis])
         return frame, apart, folds

@@ -210,7 +210,7 @@ class Layers:
         """Compute a box: cut a patch into the content of the layer below."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
-        # Check for cancellation here, because a box is finished before a kernel would check for it.
+        # Check for cancellation before each box, because a kernel would finish a box before its first check.
         advance(0.0)
         with answering(advance, 0.0):
             stitcher = self.exemplar.stitcher

@@ -90,7 +90,7 @@ def grow_as_printed(
         first, coarsest = first - 1, coarsest.parents()
     zero = np.zeros(coarsest.points * len(region.shape), np.int32)
     start = Start(first, lambda region, frames, asked, progress: (zero, None))
-    # A_l is the field at the positions of the level's points.
+    # A_l, the Jacobians of level l, is the field at the positions of the level's points.
     frames = partial(to_fixed, field)
     correction = Correction(exemplar, seed, first, compensated)
     return grow(region, levels, start, correction, frames, show=show, progress=progress)
@@ -118,7 +118,7 @@ class Correction:
         """Jitter and correct a level. Levels coarser than all levels of the exemplar are only jittered."""
         levels = self.exemplar.analyse().levels
         if level > self.first:
-            # Eq. 2: S_l[p] = S_l[p] + h_l H(p) r_l. Here h_l is 1.
+            # Jitter by Eq. 2, S_l[p] = S_l[p] + h_l H(p) r_l, with h_l = 1.
             places = jitter(places, region, JITTER, seed=self.seed, level=level - self.first)
         places = bring_inside(places, levels[max(level, 0)], max(-level, 0))
         if level < 0:

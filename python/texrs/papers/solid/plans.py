@@ -96,7 +96,7 @@ def choose_plan(
         or the size of the result, so that all textures of an exemplar use the same method.
 
     """
-    # Labels have no colours that could be evaluated.
+    # Do not try plans with labels, because labels have no colours by which results could be compared.
     if patches != "auto" or exemplar.labels:
         return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher

@@ -91,8 +91,8 @@ class World:
         small, large = _SIDES[self.axes]
         chain = [(0, -1)] + [(v, i) for v in range(len(windows.levels)) for i in range(windows.step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
-        # Cache the last stage separately. Earlier stages are small and expensive, and the last one would displace
-        # them.
+        # Cache the last stage separately, because its large boxes would displace the earlier stages, which are small
+        # and expensive.
         self._kept: tuple[Cache[Key, Places], ...] = tuple(
             Cache(cache_bytes // 2, lambda p: p.nbytes) for _ in range(2)
         )
@@ -271,7 +271,7 @@ def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tu
     if halves is None:
         yield start, stop
         return
-    # Divide the halves again. The resulting boxes are relative to the half.
+    # Divide each half again, and add its offset, because the resulting boxes are relative to the half.
     for half in halves:
         offset = [s.start for s in half]
         for a, b in _divide_missing(missing[half], side, margin):

@@ -296,7 +296,7 @@ def splice(
         raise InvalidInput(
             "use_nets: cannot be combined with use_cells, because a texture is composed of cells or of knots"
         )
-    # Analyse images, after all cheap checks of the arguments.
+    # Analyse the images only after all cheap checks of the arguments.
     watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
     mine, theirs = as_elements(elements, "elements", watch), as_elements(layout, "layout", watch)
     rows, columns = shape or as_size(mine.mask.shape, minimum=16)
@@ -488,7 +488,7 @@ def self_splice(
     watch = progress or (lambda stage, share: None)
     mine = as_elements(elements, "elements", watch)
     check_work("self_splice", [mine.image], asked or mine.mask.shape, "elements" if asked is None else "size")
-    # Bring the texture to another size first, and edit that texture.
+    # If another size is requested, extend or crop the texture first, and then edit the result.
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {
             "seed": number,

@@ -120,7 +120,7 @@ def limit_strain(a: ElementAnalysis, match: Match, *, rounds: int = 200) -> Matc
         return match
     try:
         corners = Delaunay(start).simplices
-    except QhullError:  # All points are on a line.
+    except QhullError:  # All points are on a line, so they cannot be triangulated.
         return match
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
     first, second = np.unique(edges, axis=0).T

@@ -50,8 +50,8 @@ def deform(a: ElementAnalysis, match: Match) -> Deformation:
         return deform_by_energy(a, match)
     extension = match.extension
     shift = interpolate(*_list_constraints(match))
-    # Leave the background next to a shrinking element in the mesh, so that it is stretched over the element's place.
-    # Each missing pixel of background would leave a hole of many pixels.
+    # In a splice, do not erase the background around removed elements, because it is stretched over their places. Each
+    # erased pixel would leave a hole of many pixels.
     removed = mark_removed(extension, match.assigned, grown=int(extension.originals > 0))
     return Deformation(_add_places(shift, extension.origin), extension.instance > 0, removed)
 

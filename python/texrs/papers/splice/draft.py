@@ -26,7 +26,7 @@ def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole:
     stays = _mark_copied(places, mirrored, known)
     step = match.shift[0]
     if extension.originals and (match.shift == step).all():
-        # If all elements move by the same vector, pixels that move by this vector stay, also next to new pixels.
+        # If all elements move by the same vector, keep all known pixels that also move by it, even next to new pixels.
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
         stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     if whole and a.layout == Layout.DISJOINT:

@@ -152,7 +152,8 @@ def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
     index = np.rint((at - origin) @ span)
     low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-    # Round the lattice, because it has many ties and the last bits of its fit depend on the processor.
+    # Round the lattice points, because many distances tie, and the last bits of the lattice's fit depend on the
+    # processor.
     places = np.round(sites.reshape(-1, 2) @ basis + origin, 6)
     of, _ = match_points(places, at)
     return at + amount * (places[of] - at)

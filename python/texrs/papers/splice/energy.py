@@ -128,7 +128,8 @@ def make_energy_triangle(
     ties = tie_neighbours(rigid.shape, goal)
     bands = []
     for down, right in STEPS:
-        # Sum the equations that contain both pixels, in a fixed order.
+        # For each pair of pixels, sum the products of their coefficients over the equations that contain both, in a
+        # fixed order.
         band = np.zeros(rigid.shape)
         for one in ((1, 0), (0, 1), (0, 0), (0, -1), (-1, 0)):
             other = (one[0] + down, one[1] + right)
@@ -166,7 +167,7 @@ def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> 
     """
     m = rigid if axis == 1 else rigid.T
     h, w = m.shape
-    # In Figure 5, pixels outside the image count as rigid.
+    # Count pixels outside the image as rigid, as in Figure 5 of the paper.
     left = np.pad(m, ((0, 0), (1, 0)), constant_values=True)[:, :-1]
     right = np.pad(m, ((0, 0), (0, 1)), constant_values=True)[:, 1:]
     value = m + small

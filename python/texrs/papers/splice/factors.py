@@ -60,7 +60,7 @@ def make_triangle(
     there = flat != 0
     there[:, 0] = True
     starts = np.zeros(size + 1, np.int32)
-    # Count band by band, because NumPy is slow along a short axis.
+    # Count the nonzeros of each row band by band, because NumPy is slow along a short axis.
     count = np.zeros(size, np.uint8)
     for band in there.T:
         count += band

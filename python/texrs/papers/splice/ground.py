@@ -154,7 +154,7 @@ def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32
     moved[label[(places != here).any(axis=-1) & (label > 0)]] = True
     stays = np.zeros(int(scene.own.max()) + 2, bool)
     stays[element[(label > 0) & ~moved[label]] + 1] = True
-    # The last entry is for foreground that belongs to no element.
+    # The last entry is for foreground outside all elements.
     stays[-1] = not moved.any()
     still = stays[scene.own] & (scene.own != 0) & ~moved[label]
     places[still] = here[still]
@@ -197,7 +197,7 @@ def cut_in(
     here, there = (guide[p[..., 0], p[..., 1]] for p in (ground, carried))
     elements = label > 0
     everywhere = np.ones(label.shape, bool)
-    # Keep mattes such as shadows complete: they are a hard constraint, so the seam runs around them.
+    # Make mattes such as shadows a hard constraint of the cut, so that seams run around them.
     core = elements | (offered & scene.certain[carried[..., 0], carried[..., 1]])
     taken = cut(here, there, everywhere, offered | elements, core_b=core, cost="paper").mask | elements
     return np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
@@ -240,7 +240,7 @@ def measure_matte(guide: Floats, a: ElementAnalysis, parts: Foreground, away: Fl
     apart = guide - usual
     deviation = float(np.sqrt((apart[sure] ** 2).mean())) + 1 / 255
     padded = np.pad(apart, ((reach, reach), (reach, reach), (0, 0)))
-    # Mark the pixels of other elements, to ignore them.
+    # Store the element of each pixel, so that pixels of other elements can be ignored.
     owner = np.pad(parts.region, reach, constant_values=-1)
     # Average the difference from the local background over all complete elements.
     total, count = np.zeros((*none.shape, guide.shape[-1])), np.zeros(none.shape)

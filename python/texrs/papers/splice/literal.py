@@ -73,7 +73,8 @@ def fill_literally(draft: Draft, seed: int) -> Draft:
         places=places,
         known=np.ones_like(holes),
         fixed=np.zeros_like(holes),
-        # Give all samples kind 1, so that any of them can replace any pixel. Pixels that request 1 are not jittered.
+        # Give all samples kind 1, so that any sample can replace any pixel. Pixels that request kind 1 are not
+        # jittered.
         wanted=np.where(rigid == 1, 1, 255).astype(np.uint8),
         kinds=np.zeros_like(draft.kinds) + np.uint8(1),
     )

@@ -162,7 +162,7 @@ def match_layouts(
         assigned, cost = match_points(extension.points, wanted)
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, extension, assigned, factor * gain, angle, gain, cost)
-    assert best is not None  # A rotation of 0 is always among them.
+    assert best is not None  # A rotation by 0 degrees is always tried.
     if disjoint or scale is not None:
         return best
     # Try offsets of the layout, because a connected figure bends less if its elements move less.
@@ -184,8 +184,8 @@ def interpolate_layouts(a: ElementAnalysis, match: Match, strength: float) -> Ma
     """Move the targets of elements a share of the way: 0 keeps the texture's own layout, 1 uses the other one."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:
-        # Keep elements without a target if there is room. Otherwise they would be erased although the layout hardly
-        # changes.
+        # Keep a share of the elements without a target, in the places with most room. Otherwise they would all be
+        # erased, although a low strength hardly changes the layout.
         points = match.extension.points
         rest = np.setdiff1d(np.arange(len(points)), assigned)
         if len(rest):
@@ -257,8 +257,8 @@ def _measure_gain(a: ElementAnalysis, distances: Points) -> float:
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
     if not len(area):
         return 1.0
-    # Use quartiles instead of extremes, so that the layout stays dense. The few elements that still collide are pushed
-    # apart.
+    # Use quartiles instead of extremes, so that the layout stays dense. A later step pushes apart the few elements
+    # that still collide.
     diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
     return max(1.0, CLEARANCE * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
@@ -290,7 +290,7 @@ def _place_targets(
     if shape is None:
         found = (layout.cover if lattice else layout.within)(first, last)[0]
     else:
-        # Use a box of the same size for all angles.
+        # Sow a box of the same size for all rotations, so that they can share its points.
         reach = float(np.hypot(*(high - low))) / 2 / scale + float(np.abs(np.asarray(offset)).max()) / scale
         around = np.floor(centre - reach), np.ceil(centre + reach)
         found, _ = continue_points(layout, shape, first, last, around=around)
@@ -391,7 +391,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
             points=np.concatenate([points, places[new]]),
             element=np.concatenate([np.arange(len(points)), of[new]]),
         )
-    # Apply the steps to the extended layout, and find cut elements that would enter.
+    # Apply the steps to the extended layout, and find cut elements that would enter the image.
     edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
     shift = edited.points - extension.points
     inwards = np.zeros(len(shift), bool)
@@ -429,7 +429,7 @@ def _fill_sites(sites: Points, moved: Points, size: tuple[int, int], unit: float
     away = np.maximum(-moved, moved - (np.array(size) - 1)).max(axis=1)
     spare = np.flatnonzero(away > radius)
     wanted = sites[((sites > -radius) & (sites < np.array(size) - 1 + radius)).all(axis=1)]
-    # Skip places that have an element nearby, such as places that enter from both sides of a border.
+    # Skip places that already have an element nearby.
     wanted = wanted[nearest_distances(wanted, 1, moved)[:, 0] > ALONE * unit] if len(wanted) else wanted
     wanted = wanted[: len(spare)]
     if not len(wanted):

@@ -171,7 +171,7 @@ def _sow(
     picture = Picture(disc[..., np.newaxis], SourceMap.identity(sides), disc)
     size = tuple(int(np.ceil(n)) + 1 for n in (high - low) * unit)
     patch = min(PATCH * scale * unit, min(sides) / 2)
-    # Grow the drawing of the points by quilting.
+    # Enlarge the drawing of the points by quilting.
     grown = quilt(
         [picture],
         (size[0], size[1]),
@@ -267,7 +267,8 @@ def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float)
 
     count = len(radius)
     turn = (np.arange(count) - np.arange(count)[:, np.newaxis]) % count
-    # Each element is the first in its own list. Ties have different orders for different elements.
+    # For each element, list the elements of similar size, itself first. Ties have different orders for different
+    # elements, so that copies vary.
     alike = np.lexsort((turn, np.abs(radius - radius[:, np.newaxis])), axis=1)[:, :ALIKE]
     middle = at[:own].mean(axis=0) if own else at.mean(axis=0)
     order = np.argsort(np.hypot(*(at[own:] - middle).T), kind="stable") + own

@@ -98,8 +98,8 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     match, still = choose_elements(a, parts, edit, step, seed)
     watch("match", 1.0)
     base, seen = move_picture(a, step)
-    # Keep the background and elements that do not move. Keep foreground without an element unless its straight edge enters the
-    # image.
+    # Keep the background and elements that do not move. Also keep foreground outside all elements, unless its side
+    # that the border cut would enter the image.
     number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
@@ -114,7 +114,7 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     whole = cut_in(scene, bare, places, label, element, room=rest == 0) if label.any() else bare
     pasted, everywhere, light = label > 0, np.ones(known.shape, bool), scene.light
     nothing = np.zeros(known.shape, np.uint8)
-    # The draft contains the moved elements on the background before its holes are filled. A stage drawing shows it.
+    # For the stage picture, combine the moved elements with the background before its holes are filled.
     before = np.where(pasted[..., np.newaxis], places, base)
     draft = Draft(before, known | pasted, everywhere, nothing, nothing, np.zeros((*known.shape, 2), bool))
     return Rearrangement(
@@ -190,7 +190,7 @@ def choose_elements(
     away = ((extension.points < 0) & (shift <= 0)) | ((extension.points > size - 1) & (shift >= 0))
     shown &= (shift != 0).any(axis=1) & ~(around | (away & ~np.array(edit.cyclic))).any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
-    # Later elements cover earlier ones, and their places are chosen first.
+    # Sort the elements so that later ones cover earlier ones. Later entering elements also choose their places first.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]
     element, goal = extension.element[chosen].copy(), edit.points[chosen].copy()
     comes, inwards = comes[chosen], edit.inwards[chosen]
@@ -259,7 +259,7 @@ def paste_elements(
         for k in moved.tolist():
             i = int(match.assigned[k])
             pixels = np.stack(np.divmod(order[begin[i + 1] : begin[i + 2]], size[1]), axis=-1)
-            # If the texture wraps, an element may be on both sides of its border.
+            # If the texture wraps, parts of an element can be on opposite sides of the image.
             at = pixels + shift[k] - np.rint((pixels - parts.points[i]) / size).astype(np.intp) * size
             at = np.where(cyclic, at % size, at)
             seen = ((at >= 0) & (at < size)).all(axis=1)

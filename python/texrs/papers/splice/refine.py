@@ -109,8 +109,8 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
         filled = fill_with_patches(image, draft, ground, scale, seed, progress)
         if filled is not None:
             return filled
-    # Continue the nearest known pixel over the hole. If this reaches a texture pixel that is not background, use
-    # random background.
+    # Continue the source coordinates of the nearest known pixel over the hole. If they reach a pixel that is not
+    # background, use a random background pixel.
     at = np.argwhere(holes)
     start = near[:, holes].T
     there = places[start[:, 0], start[:, 1]] + (at - start)
@@ -282,7 +282,8 @@ class Refinement:
         places = self.draft.places.astype(np.int32, copy=False) << BITS
         if self.levels == 1:
             return places.reshape(-1)
-        # Use the coarse sample between this pixel and the next, at (S + 1/2) / 2 - 1/2.
+        # Convert source coordinates S to the coarse level, whose samples are between two fine samples: (S + 1/2) / 2 -
+        # 1/2.
         return np.ascontiguousarray((places[::2, ::2] - ONE // 2) >> 1).reshape(-1)
 
     def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:

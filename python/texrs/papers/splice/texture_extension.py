@@ -107,7 +107,7 @@ def extend(
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
-        # Elements of the image come first, in its order.
+        # Put the elements of the image first, in their original order.
         order = np.lexsort((np.arange(len(of)), np.where(inside, of, 0), ~inside))
         places, of, flips, inside = places[order], of[order], flips[order], inside[order]
     originals = 0 if whole else int(np.count_nonzero(inside))
@@ -235,7 +235,7 @@ def _stamp(
     if not kept:
         raise InvalidInput("elements: must have whole elements, but the border cuts every one")
     chosen = np.array(kept)
-    # Number the stray pieces after the elements, and compute their centres.
+    # Number the stray pieces of foreground after the elements, and compute their centres.
     pieces, count = label(stray)
     where = np.nonzero(pieces)
     area = np.bincount(pieces[where], minlength=count + 1)[1:]

@@ -215,7 +215,8 @@ def _slide(
     def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
         return np.asarray(gather(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
 
-    # Use the target's depth near the outline. Further inside, keep the source's own depth, but stay out of the joint.
+    # Near the outline, use the depth in the target cell. Further inside, keep the depth in the source cell, but stay
+    # out of the joint.
     inside, before = depth[kept], measure(at, kind)[:, 0]
     weight = np.clip(1.3 - np.abs(inside) / reach, 0, 1)
     weight = weight * weight * (3 - 2 * weight)

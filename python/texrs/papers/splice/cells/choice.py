@@ -98,8 +98,8 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     used = np.zeros(len(usable))
     taken = np.full(len(wanted.area), -1)
     beside = list_neighbours(wanted)
-    # Shorten the list if there are few cells. Otherwise every list would contain all cells, and the cell that is
-    # easiest to bend would be used everywhere.
+    # If there are few cells, offer only half of them for each target. Otherwise the cell that is easiest to bend would
+    # be used everywhere.
     k = min(BEST, max(1, len(usable) // 2))
     source = np.zeros((len(chosen), k), np.intp)
     turn, cost = np.zeros((2, len(chosen), k))
@@ -122,7 +122,8 @@ def _compare(
     """Return the difference between each target's and each cell's profile at the best rotation, and its index."""
     flat = turned.reshape(-1, RAYS)
     own = (theirs**2).mean(axis=1)[:, None]
-    # Round, because similar cells must tie exactly. Matrix products differ in the last bit by processor and position.
+    # Round, because the costs of similar cells must tie exactly, and matrix products differ in the last bit by
+    # processor and position.
     square = (own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS).round(9)
     cost = np.sqrt(np.maximum(square, 0) / own).reshape(len(theirs), *turned.shape[:2]) + TURN * np.abs(angles) / 90
     which = cost.argmin(axis=2)
@@ -134,7 +135,8 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
     usual = cells.size**2
     fair = cells.area >= SMALL * usual
     certain = cells.certain >= TRUSTED
-    # Prefer complete cells. Cells that the border cuts lack a joint there, which looks worse than a repetition.
+    # Prefer complete cells. A cell that the border cuts has no joint on that side, which looks worse than a
+    # repetition.
     for allowed, enough in ((cells.whole & certain, ENOUGH), (cells.whole, FEW), (cells.area >= 0.6 * usual, 1)):
         rows = np.flatnonzero(fair & allowed)
         if len(rows) >= enough:

@@ -137,7 +137,8 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
         at.append(np.where(turn == 0, place, side - 1 - place))
         turns.append(turn)
     labels = cells.labels[at[0][:, None], at[1][None]]
-    # A continued cell keeps its number in the reflection. Reflections of other cells get new numbers.
+    # If the border cuts a cell, its reflection continues the cell under the same number. Reflections of other cells
+    # get new numbers.
     goes_on = np.concatenate([[False], cut])[labels]
     near, inside = np.zeros(labels.shape, np.int64), np.where(cells.joints > 0.5, 0, cells.labels)
     for axis, turn in enumerate(turns):

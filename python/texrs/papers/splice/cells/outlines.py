@@ -109,7 +109,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
     fine = np.ascontiguousarray(np.take_along_axis(fine, around[..., None], axis=1).T)
     goal = np.ascontiguousarray(np.roll(goal, -start, axis=1).T)
     stride = np.asarray(STRETCH * ((STRIDES - FINE) / FINE) ** 2, np.float32)
-    # Compute the least cost for each point and each offset from its place with equal strides.
+    # Compute the minimum cost for each point and each offset from its position under equal strides.
     total = np.full((wide, count), np.inf, np.float32)
     back = np.zeros((points, wide, count), np.int8)
     for i in range(points + 1):
@@ -117,7 +117,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
             least = np.where(np.arange(wide)[:, None] == APART, np.float32(0), total)
         else:
             least = np.full_like(total, np.inf)
-            # The stride `FINE` keeps the offset; other strides change it.
+            # A stride of `FINE` keeps the offset, and other strides change it.
             for k, step in enumerate((STRIDES - FINE).tolist()):
                 to = slice(max(step, 0), wide + min(step, 0))
                 tried = total[max(-step, 0) : wide - max(step, 0)] + stride[k]

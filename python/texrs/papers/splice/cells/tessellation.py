@@ -117,7 +117,7 @@ def take_points(
     """
     from scipy.spatial import cKDTree
 
-    # Use the continued layout, so that cells at the image's border are like the others.
+    # Use the layout continued beyond its image, so that cells at the image's border have neighbours on all sides.
     low, high = layout.points.min(axis=0), layout.points.max(axis=0)
     around, _ = layout.cover(low - 2 * layout.scale, high + 2 * layout.scale)
     step = max(layout.scale / 16, float((high - low).max()) / SAMPLES)
@@ -125,7 +125,7 @@ def take_points(
     owner = cKDTree(around).query(grid.reshape(-1, 2))[1]
     inner = ((around >= low) & (around <= high)).all(axis=1)
     counts = np.bincount(owner, minlength=len(around))[inner]
-    # Use the spacing instead if all points are on one line, which has no cells between points.
+    # If all points are on one line, their cells have no area, so use the square of the spacing.
     area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
     factor = unit / float(np.sqrt(area)) if scale is None else scale
     # Assume that no cell extends further from its point than the width of a typical cell.

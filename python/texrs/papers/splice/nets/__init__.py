@@ -125,7 +125,7 @@ def splice_nets(
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
     laid = lay_knots(a, mine, wanted.points, theirs, unit, seed, watch)
     places = grow_rest(a, laid, mine, theirs, unit, seed, watch)
-    # Number the visible targets from top to bottom, because labels start at 1.
+    # Label the visible targets from top to bottom, starting at 1, because label 0 means that a pixel has no target.
     shown = np.unique(laid.target[laid.target != FREE]).astype(np.intp)
     shown = shown[np.lexsort((wanted.points[shown, 1], wanted.points[shown, 0]))]
     number = np.zeros(len(wanted.points) + 1, np.uint32)

@@ -62,7 +62,7 @@ def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floa
     pixels = np.argwhere(np.ones(shape, bool)).astype(np.float64)
     knot = cKDTree(points).query(pixels)[0] / unit
     start, along = points[pairs[:, 0]], points[pairs[:, 1]] - points[pairs[:, 0]]
-    # The nearest line is the line of the nearest sampled point.
+    # Sample points along each line. The line nearest to a pixel is the line of the sample nearest to it.
     count = np.ceil(np.hypot(*along.T) / DENSE).astype(np.intp) + 1
     owner = np.repeat(np.arange(len(pairs)), count)
     share = (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[owner] - 1, 1)
