@@ -66,7 +66,7 @@ impl Inverse {
         }
     }
 
-    /// Solves the systems of all channels of a row. `fill` gets the old row and writes the right-hand side. The
+    /// Solves the systems of all channels of a row. `fill` receives the old row and writes the right-hand side. The
     /// solution then replaces the row.
     pub(super) fn apply(
         &self,
@@ -85,7 +85,7 @@ impl Inverse {
                 from[to * self.channels + c] = sign * from[source * self.channels + c];
             }
         }
-        // Each step shortens the extended row, until its own length is left.
+        // Each step shortens the extended row, until only its original length is left.
         let mut left = len;
         let last = self.steps.len() - 1;
         for &(step, own, beside) in &self.steps[..last] {

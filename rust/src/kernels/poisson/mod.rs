@@ -1,5 +1,5 @@
-//! Screened Poisson equation: the image whose differences are nearest to given ones and whose
-//! values stay near a given image.
+//! Screened Poisson equation: the image whose differences between neighbours are nearest to given differences, and
+//! whose values stay near a given image.
 //!
 //! It minimises `sum over edges (v_q - v_p - g_pq)^2 + screening * sum (v - I)^2` (Pérez, Gangnet
 //! and Blake, *Poisson image editing*, SIGGRAPH 2003). The screening is that of Bhat et al.,
@@ -62,10 +62,10 @@ pub struct Problem<'a> {
     pub domain: Domain<'a>,
 }
 
-/// Maximum screening. Beyond it the solution is 0 in `f32`, and larger values would overflow.
+/// Maximum screening. Beyond it the correction is 0 in `f32`, and larger values would overflow.
 const STRONGEST: f64 = 1e30;
 
-/// Number of rows of a task. The transforms of a task are computed together.
+/// Number of rows in each parallel task, whose transforms are computed together.
 const ROWS: usize = 2 * LANES;
 
 /// Returns the solution. Without screening and without fixed pixels, it has the mean of the image.
@@ -80,7 +80,8 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
             problem.domain.check(argument, gradients[axis].len())?;
         }
     }
-    // Compute the flow into each pixel, spread it, and add the correction to the image.
+    // Compute the right-hand side, which is the flow into each pixel. Solve for the correction, and add it to the
+    // image.
     memory::room("the solution", problem.image.len(), 4)?;
     let width = columns * channels;
     let mut out = vec![0.0; problem.image.len()];
@@ -111,8 +112,7 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
         ..*domain
     };
     let [rows, columns, channels] = domain.shape;
-    // Memory for half of the rows, half of these and a transposed copy, or for the levels of the
-    // pyramid.
+    // Check the memory for half of the rows, half of these and a transposed copy, or for the levels of the pyramid.
     memory::room("the solution", rows * columns, 12 * channels + 32)?;
     if !flow.is_empty() {
         // A mask that is a rectangle is solved directly, other masks by multigrid.
@@ -136,8 +136,8 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
     monitor.check()
 }
 
-/// Returns the rectangle (first and number of rows, of columns) that a mask marks, if it is one and
-/// fixed pixels surround it.
+/// Returns the rectangle that a mask marks: (first row, number of rows), and the same for the columns. The result is
+/// `None` if the marked pixels are not a rectangle, or if fixed pixels do not surround it.
 fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 2]> {
     let [rows, columns] = shape;
     let first = mask.iter().position(|&m| m)?;
@@ -183,7 +183,7 @@ impl Domain<'_> {
     }
 }
 
-/// Adds the flow into row `y`: the differences that the image lacks, channels last.
+/// Adds the flow into the pixels of row `y`: the target differences minus the differences of the image, channels last.
 #[inline(always)]
 fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     let Domain {
@@ -219,7 +219,7 @@ fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     }
 }
 
-/// Adds the excess of the target differences over the differences from `from` to `to`.
+/// Adds the target differences minus the differences from `from` to `to`, multiplied by `sign`.
 #[inline(always)]
 fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign: f32) {
     let pairs = out.iter_mut().zip(from.iter().zip(to));
@@ -231,7 +231,8 @@ fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign:
     }
 }
 
-/// Solves a window (first and number of rows, of columns), and sets the pixels around it to 0.
+/// Solves a window, and sets the pixels around it to 0. The window is given by (first row, number of rows), and the
+/// same for the columns.
 fn rectangle(
     domain: &Domain<'_>,
     edges: [Edge; 2],
@@ -306,8 +307,8 @@ impl Layout {
     }
 }
 
-/// Solves rows in place by transforms along them, and adds the base solution. Coefficients replace
-/// the samples of their rows, one channel after another.
+/// Solves rows in place by transforms along them, and adds the base solution. During the solution, the coefficients of
+/// a row replace its samples, one channel after another.
 fn transformed(field: &Field, level: &Level<'_>, inner: &mut [f32], monitor: &Monitor) {
     let (transform, channels) = (&field.transform, field.channels);
     let (layout, width) = (level.layout, level.layout.width);

@@ -76,9 +76,9 @@ impl Systems {
         }
     }
 
-    /// Whether the systems of every second row determine the solution. A system whose solution is
-    /// unique only up to a constant is excluded, because the mean of all rows selects the constant.
-    /// Shifts beyond the range of `f32` are excluded too.
+    /// Returns whether the systems of every second row determine the solution. A system whose solution is unique only
+    /// up to a constant is excluded, because the mean of all rows selects the constant. Shifts beyond the range of
+    /// `f32` are excluded too.
     pub(super) fn can_be_squared(&self) -> bool {
         let fixed = self.edge == Edge::Fixed;
         let unique = |&shift: &f64| fixed || shift > f64::EPSILON;

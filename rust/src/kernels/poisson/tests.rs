@@ -119,8 +119,8 @@ proptest! {
     }
 }
 
-/// Returns the unit eigenvectors of the second difference along an axis with their eigenvalues, and
-/// the first pixel.
+/// Returns the unit eigenvectors of the second difference along an axis with their eigenvalues, and the first pixel
+/// that is not fixed.
 fn modes(edge: Edge, pixels: usize) -> (Vec<(f64, Vec<f64>)>, usize) {
     let ring = usize::from(edge == Edge::Fixed);
     let n = pixels.saturating_sub(2 * ring);

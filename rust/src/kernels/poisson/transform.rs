@@ -16,7 +16,7 @@ pub(super) struct Transform {
     edge: Edge,
     len: usize,
     lines: Lines<Lanes>,
-    /// Sines of the folding, or rotations by half a sample.
+    /// Sines for folding the rows (fixed ends), or rotations by half a sample (free ends).
     twiddles: Vec<Complex<f32>>,
     /// Eigenvalue of each coefficient.
     pub(super) eigenvalues: Vec<f64>,

@@ -28,7 +28,7 @@ const FLAT: f32 = 0.05;
 /// detect.
 pub(super) const FARTHEST: f32 = f32::MAX / 2.0;
 
-/// Test values: ordinary ones, and values whose sums and quotients overflow.
+/// Test values: ordinary values, and values whose sums and quotients overflow.
 #[cfg(test)]
 pub(super) const EXTREMES: [f32; 8] = [0.0, 0.5, 1.0, 1e30, 1.6e38, -1.6e38, f32::MAX, -f32::MAX];
 
@@ -43,8 +43,8 @@ pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + (x - y).abs())
 }
 
-/// Two images on one canvas. `C` is the number of channels if it is a known constant, so that loops
-/// unroll, else 0.
+/// Two images on one canvas. `C` is the number of channels if this is 1 or 3, so that loops unroll. For other numbers
+/// `C` is 0.
 #[derive(Clone, Copy)]
 pub(super) struct Pair<'a, const C: usize> {
     pub a: &'a [f32],
@@ -65,8 +65,8 @@ impl<'a, const C: usize> Pair<'a, C> {
         distance(&self.a[at..][..n], &self.b[at..][..n])
     }
 
-    /// Returns the cost of a seam between neighbours `s` and `t`. `differences` is the sum of the
-    /// distances at both.
+    /// Returns the cost of a seam between neighbours `s` and `t`. `differences` is the sum of the distances at both
+    /// pixels.
     #[inline(always)]
     pub(super) fn edge(&self, cost: Cost, s: usize, t: usize, differences: f32) -> f32 {
         let plain = match cost {

@@ -88,15 +88,16 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
     };
     let forward: [Vec<i32>; D] = energy.forward.map(rounded);
     let backward: [Vec<i32>; D] = energy.backward.map(rounded);
-    // A unary difference larger than all pairs of a point together decides its label. Clip it
-    // there, so that any large number forbids a label.
+    // A unary difference that exceeds the sum of all pairwise costs of a point decides its label. Clip it there, so
+    // that large and infinite costs forbid a label in the same way.
     let most = (2 * D) as f64 * f64::from(capacity(largest, scale)) + 1.0;
     let terminal: Vec<i32> = energy
         .unary
         .iter()
         .map(|u| {
             let steps = (difference(u) * scale).clamp(-most, most);
-            // `f64::round` would be a function call on CPUs that may lack the instruction.
+            // `f64::round` would be a function call unless the compiler's target is known to have a rounding
+            // instruction.
             (steps + 0.5f64.copysign(steps)) as i32
         })
         .collect();

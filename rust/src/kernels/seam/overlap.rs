@@ -12,8 +12,8 @@ use crate::{Error, Result};
 pub struct OldSeams<'a, const D: usize> {
     /// Cost of the existing seam, paid if both points keep A. Zero without a seam.
     pub kept: [&'a [f32]; D],
-    /// Cost if the first point keeps A and the next takes B: the first point's old source against
-    /// B.
+    /// Cost of a seam between the first point's old source and B. It is paid if the first point keeps A and the next
+    /// takes B.
     pub ab: [&'a [f32]; D],
     /// Cost if the first point takes B and the next keeps A.
     pub ba: [&'a [f32]; D],

@@ -1,11 +1,10 @@
-//! A queue of nodes by distance, for searches whose distances never fall far behind. It is Dial's
-//! queue (*Algorithm 360: shortest-path forest with topological ordering*, CACM 1969) with buckets
-//! of more than one distance.
+//! A queue of nodes by distance, for searches that advance by bounded steps. It is Dial's queue (*Algorithm 360:
+//! shortest-path forest with topological ordering*, CACM 1969) with buckets that span more than one distance.
 
 /// Maximum number of buckets. More would cost memory without benefit.
 const MOST: u32 = 4096;
 
-/// Buckets on a ring.
+/// A ring of buckets.
 ///
 /// Within a bucket, the oldest entry is taken first, so a node may be taken before its distance is
 /// final. It is then pushed again, and its old entry is stale. If the newest entry were taken
@@ -51,7 +50,7 @@ impl Queue {
         self.entries += 1;
     }
 
-    /// Returns a node of the lowest bucket and its distance, or `None` if the bucket is beyond
+    /// Returns a node of the lowest bucket and its distance, or `None` if the queue is empty or the bucket is beyond
     /// `last`.
     #[inline(always)]
     pub(super) fn pop(&mut self, last: u32) -> Option<(u32, u32)> {

@@ -5,8 +5,8 @@
 //! image. In the overlap:
 //!
 //! 1. pixels of a core are tied to its image;
-//! 2. other pixels next to a pixel that only A covers are tied to A; of the rest, pixels next to a pixel that only B
-//!    covers are tied to B;
+//! 2. other pixels next to a pixel that only one image covers are tied to this image, and to A if they have neighbours
+//!    of both kinds;
 //! 3. the remaining pixels minimise the sum of the costs of the cut edges ([`super::cost`]); among
 //!    equal sums, as few pixels as possible take B.
 //!
@@ -15,7 +15,7 @@
 //!
 //! Departures from the paper:
 //!
-//! - The existing image A has priority at pixels that touch both.
+//! - The existing image A has priority at pixels with neighbours of both kinds.
 //! - A `penalty` keeps seams away from chosen pixels.
 //! - An old seam is a pairwise term with one cost for each labelling. It follows Kolmogorov and
 //!   Zabih, *What energy functions can be minimized via graph cuts?*, PAMI 2004. Kwatra's extra
@@ -40,7 +40,7 @@ pub struct Stitched {
     pub b: Vec<bool>,
     /// Sum of the costs of the seam's edges inside the overlap, including old seams that stay.
     pub value: f64,
-    /// Number of edges between a pixel of A and one of B in the overlap.
+    /// Number of edges in the overlap whose ends take different images.
     pub edges: usize,
 }
 
@@ -49,8 +49,8 @@ pub fn cut<const D: usize>(overlap: &Overlap<'_, D>, monitor: &Monitor) -> Resul
     Stitcher::default().cut(overlap, monitor)
 }
 
-/// Costs of the pair of a point and the next one for each choice of A and B. If both take B, the
-/// cost is 0.
+/// Costs of a pair of neighbours. `kept` applies if both keep A, and `ab` if the first keeps A and the second takes B.
+/// `ba` applies if the first takes B and the second keeps A. If both take B, the cost is 0.
 #[derive(Debug, Clone, Copy, Default)]
 struct Costs {
     kept: f32,
@@ -58,8 +58,7 @@ struct Costs {
     ba: f32,
 }
 
-/// Windows of fewer pixels go to the general solver, which is as fast for them and reuses its
-/// workspace.
+/// Windows with fewer pixels than this go to the general solver, which is as fast for them and reuses its workspace.
 const SMALL: usize = 64 * 64;
 
 /// A workspace for stitching. After the first cut of a size, further cuts allocate only their
@@ -303,8 +302,8 @@ impl<const D: usize> Stitcher<D> {
                 if kept == 0 {
                     (self.forward[axis][i], self.backward[axis][i]) = (ab, ba);
                 } else {
-                    // With x = 1 for B: kept + (ba - kept) x_i - ba x_j + (ab + ba - kept) (1 -
-                    // x_i) x_j.
+                    // Let x be 1 for pixels of B. The cost of the edge is kept + (ba - kept) x_i - ba x_j + (ab + ba -
+                    // kept) (1 - x_i) x_j.
                     self.forward[axis][i] = ab + ba - kept;
                     self.terminal[i] += ba - kept;
                     self.terminal[j] -= ba;

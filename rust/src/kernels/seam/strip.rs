@@ -28,9 +28,9 @@ pub struct Pasted<'a> {
     pub a: &'a [f32],
     /// The image at the end of `axis`.
     pub b: &'a [f32],
-    /// The axis that the seam crosses: the first line along it takes A, the last one B.
+    /// The axis that the seam crosses. The first line along it takes A, and the last line takes B.
     pub axis: usize,
-    /// Whether the other axis wraps, so that the seam is closed.
+    /// If true, the other axis wraps and the seam is closed.
     pub cyclic: bool,
     /// Penalty of each pixel. The cost of an edge is multiplied by 1 plus the mean penalty of its
     /// ends.
@@ -55,7 +55,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
         _ => weigh::<0>(pasted),
     }?;
     let [rows, columns] = pasted.shape;
-    // The rows of the solver run along the seam.
+    // The solver separates the first column from the last column, so transpose images that are arranged along axis 0.
     let (shape, across, along) = match pasted.axis {
         1 => ([rows, columns], Cow::from(&costs[1]), Cow::from(&costs[0])),
         _ => {
@@ -74,7 +74,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     while longest * scale >= (LONGEST / 2) as f64 {
         scale *= 0.5;
     }
-    // No single cost exceeds the longest line, so it fits.
+    // No single cost exceeds the largest sum along a line, so each rounded cost fits.
     let rounded = |costs: &[f32]| -> Vec<u32> {
         let round = |&c: &f32| (f64::from(c) * scale + 0.5) as i32 as u32;
         costs.iter().map(round).collect()

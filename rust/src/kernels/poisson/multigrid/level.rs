@@ -25,7 +25,7 @@ pub(super) struct Level {
     pub(super) columns: usize,
     /// Low and high side of the axis of rows and of the axis of columns.
     sides: [[Side; 2]; 2],
-    /// Zero at pixels that are not free, like the reciprocals.
+    /// Diagonal of the operator. It is 0 at pixels that are not free, and so is `reciprocal`.
     diagonal: Vec<f32>,
     reciprocal: Vec<f32>,
     /// Flags of the free pixels, if all of them have the same diagonal, as at the finest
@@ -131,7 +131,7 @@ impl Level {
         coarse
     }
 
-    /// Computes the diagonal: links, fixed links and screening.
+    /// Computes the diagonal: the links to free pixels, the links to fixed pixels, and the screening.
     fn finish(&mut self, open: &[f32]) {
         let mut diagonal = std::mem::take(&mut self.diagonal);
         self.each_row(&mut diagonal, |r, out| {
@@ -411,7 +411,7 @@ fn one<const WHAT: u8>(
 }
 
 wide_fn! {
-    /// Relaxes `first` times the right-hand side.
+    /// Relaxes once, starting at `first` times the right-hand side.
     fn relax_multiple(b: [&[f32]; 5], first: f32, reciprocal: f32, open: &[u8], step: f32, out: &mut [f32]) {
         let n = out.len();
         let ([here, above, below, before, after], open) = (b.map(|b| &b[..n]), &open[..n]);

@@ -22,9 +22,9 @@ const MAX_CYCLES: usize = 200;
 /// Step lengths of the relaxation: reciprocals of the roots of the Chebyshev polynomial on [1/2,
 /// 2]. This is the part of the spectrum that the coarser level does not represent.
 const STEPS: [f32; 2] = [0.561, 1.390];
-/// Number of relaxations that solve the coarsest level.
+/// Number of pairs of relaxations, one for each step length, that solve the coarsest level.
 const COARSEST: usize = 8;
-/// Number of samples of a task.
+/// Number of samples in each parallel task.
 const CHUNK: usize = 1 << 14;
 
 pub(super) fn spread(
@@ -53,7 +53,7 @@ pub(super) fn spread(
             _ => Side::Fixed,
         })
     });
-    // Build the levels until the coarsest has at most 3 pixels a side.
+    // Build the levels until the coarsest has at most 3 pixels on each side.
     let screening = domain.screening as f32;
     let inside = |r: usize, c: usize| free(top + r, left + c);
     let mut levels = vec![Level::finest([height, width], sides, screening, inside)];
@@ -138,7 +138,8 @@ fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     STEPS.iter().rev().for_each(|&step| level.relax(v, step));
 }
 
-/// Solves for `vectors[0].b`, whose contents are destroyed. Sums run by fixed chunks, in order.
+/// Solves for the right-hand side `vectors[0].b`, and overwrites it. Sums run over fixed chunks in order, so the
+/// result does not depend on the number of threads.
 fn conjugate_gradients(
     levels: &[Level],
     vectors: &mut [Vectors],

@@ -60,8 +60,8 @@ impl<const D: usize> Layout<D> {
         }
     }
 
-    /// Returns bits `2 * axis` and `2 * axis + 1`: the point is at the start, or at the end, of a
-    /// wrapped axis.
+    /// Returns flags of a point. Bit `2 * axis` means that it is at the start of a wrapped axis, and bit `2 * axis +
+    /// 1` that it is at the end.
     pub(super) fn ends(&self, mut point: [usize; D], i: usize) -> u8 {
         point[D - 1] = i;
         let mut bits = 0;
@@ -74,8 +74,8 @@ impl<const D: usize> Layout<D> {
         bits
     }
 
-    /// Returns a table by the values of [`Self::ends`]: the offsets of the next and the previous
-    /// point along each axis.
+    /// Returns a table that is indexed by [`Self::ends`]: the offsets of the next and the previous point along each
+    /// axis.
     pub(super) fn offsets(&self) -> [[[i32; 2]; D]; ENDS] {
         std::array::from_fn(|bits| {
             std::array::from_fn(|axis| {

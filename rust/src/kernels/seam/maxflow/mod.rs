@@ -113,7 +113,7 @@ struct Node<const D: usize> {
     tree: Tree,
     /// Whether the node is in the queue.
     active: bool,
-    /// Ends of wrapped axes at this node. Selects the row of neighbour offsets.
+    /// Bits of the ends of wrapped axes where this node is. They select the row of neighbour offsets.
     ends: u8,
 }
 

@@ -23,8 +23,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Sweeps adjacent lines towards their end (`SIDE` 0) or their start. Arcs across the ends of a
-    /// wrapped axis are not used.
+    /// Sweeps adjacent lines towards their end (`SIDE` 0) or their start (`SIDE` 1). Arcs across the ends of a wrapped
+    /// axis are not used.
     fn lines<const SIDE: usize>(
         &mut self,
         from: usize,

@@ -11,7 +11,7 @@ impl<const D: usize> Solver<D> {
         p.wrapping_add_signed(self.offsets[usize::from(ends) % ENDS][axis][side])
     }
 
-    /// Returns axis and side of the parent, and the parent, of a node that has a parent.
+    /// Returns the axis and the side of a node's parent, and the parent. The node must have a parent.
     #[inline(always)]
     fn up<const CYCLIC: bool>(&self, p: u32) -> (usize, usize, u32) {
         let parent = usize::from(self.node(p).parent);
@@ -19,8 +19,8 @@ impl<const D: usize> Solver<D> {
         (axis, side, self.neighbour::<CYCLIC>(p, axis, side))
     }
 
-    /// Returns the residual capacity of the arc between `p` and a node `q` that the tree takes from
-    /// there. In the source's tree the arc leads to `q`, in the sink's tree out of `q`.
+    /// Returns the residual capacity of the arc that lets the tree of `p` take its neighbour `q`. In the source's tree
+    /// the arc leads from `p` to `q`, in the sink's tree from `q` to `p`.
     #[inline(always)]
     fn arc<const TREE: usize>(&self, p: u32, q: u32, axis: usize, side: usize) -> i32 {
         if TREE == SOURCE {
@@ -81,8 +81,7 @@ impl<const D: usize> Solver<D> {
                     let node = self.node_mut(q);
                     let free = node.tree == Tree::Free;
                     if free || node.tree == tree {
-                        // A node whose distance is not more recent and is longer gets this shorter
-                        // path.
+                        // Give the node this path if it is shorter and the node's distance is not more recent.
                         if free || node.stamp <= stamp && node.distance > distance {
                             node.tree = tree;
                             node.parent = (2 * axis + (side ^ 1)) as u8;

@@ -37,8 +37,8 @@ impl Dual {
         Ok((cycle.value, cycle.crossings))
     }
 
-    /// Returns the shortest of the paths from the top copy of a face of P to that face. Its value
-    /// is `u32::MAX` if no such path exists.
+    /// Returns the shortest path from the top copy of a face of P to the face itself, over all faces of P. Its value
+    /// is `u32::MAX` if such a path does not exist.
     pub(super) fn around(&mut self, monitor: &Monitor) -> Result<Cycle> {
         let (width, rows) = (self.width, self.rows);
         let top = self.faces.len() - self.path.len();
@@ -99,7 +99,7 @@ impl Dual {
         Ok(best)
     }
 
-    /// Computes P, the shortest path from one of some faces to one of others.
+    /// Computes P, the shortest path from the faces `from` to the faces `to`.
     pub(super) fn lay_path(
         &mut self,
         from: &[u32],
@@ -127,9 +127,8 @@ impl Dual {
         Ok(())
     }
 
-    /// Adds the top copies of the faces of P. The cut continues beyond both ends of P to the
-    /// borders. `back` and `on` are its directions at the first and the last face, in eighths of a
-    /// turn clockwise from east.
+    /// Adds the top copies of the faces of P. The cut continues beyond both ends of P to the borders. `back` and `on`
+    /// are the directions of the cut at the first and the last face, in eighths of a turn clockwise from east.
     pub(super) fn cut_open(&mut self, back: usize, on: usize) {
         let path = std::mem::take(&mut self.path);
         self.place = vec![NEVER; self.faces.len()];

@@ -28,7 +28,7 @@ impl Face {
 }
 
 impl Face {
-    /// Takes a path to this face if it is shorter than the known one.
+    /// Takes a path to this face if it is shorter than the known path.
     #[inline(always)]
     pub(super) fn offer(&mut self, distance: u32, step: usize) {
         let nearer = distance < self.distance;
@@ -49,8 +49,8 @@ pub(super) struct Dual {
     pub(super) queue: Queue,
     pub(super) largest: u32,
     pub(super) mean: u32,
-    /// The faces of P. `steps` has the direction from each face to the next one, and `down` the
-    /// bits of the directions that leave P downwards. `place` has the index on P of each face.
+    /// The faces of P. `steps` contains the direction from each face to the next face, and `down` the bits of the
+    /// directions that leave P downwards. `place` contains the index on P of each face.
     pub(super) path: Vec<u32>,
     pub(super) steps: Vec<usize>,
     pub(super) down: Vec<u8>,
@@ -177,7 +177,7 @@ impl Dual {
         }
     }
 
-    /// Returns the original of a face.
+    /// Returns the original of a face that may be a top copy.
     pub(super) fn original(&self, f: u32) -> u32 {
         let top = self.faces.len() - self.path.len();
         (f as usize).checked_sub(top).map_or(f, |k| self.path[k])

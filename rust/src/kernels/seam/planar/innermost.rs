@@ -34,7 +34,7 @@ impl Dual {
         Ok(Some(self.residual(i64::from(cycle.value), core)))
     }
 
-    /// Closes all steps between two pixels outside the seam.
+    /// Sets the cost of all steps between two pixels outside the seam to [`NEVER`].
     fn close(&mut self, within: &[bool]) {
         let (width, columns) = (self.width, self.width + 1);
         for l in 0..=self.rows {
@@ -51,14 +51,13 @@ impl Dual {
         }
     }
 
-    /// Sets the distance of each face inside a seam to its potential. Returns whether all
-    /// potentials fit.
+    /// Sets the distance of each face inside a seam to its potential. Returns false if a potential is out of range.
     fn potentials(&mut self, cycle: &Cycle, monitor: &Monitor) -> Result<bool> {
         let (top, value) = (self.faces.len() - self.path.len(), cycle.value);
         // Paths that wind around P can lead to potentials below their start, by less than twice the
         // value.
         let base = 2 * value;
-        // Keys below the last taken one are found in the next turn of the queue.
+        // Keys below the last taken key are found in the next turn of the queue.
         self.queue.reset(2 * value + self.largest, self.mean / 4);
         self.queue.begin(base);
         for &(f, along) in &cycle.trail {
@@ -142,7 +141,7 @@ impl Dual {
         taken
     }
 
-    /// Returns how often a step crosses P upwards, minus how often downwards.
+    /// Returns the number of times that a step crosses P upwards, minus the number of times downwards.
     fn winding(&self, f: u32, direction: usize, to: u32) -> i64 {
         let downwards = |p: u32, d: usize| {
             let k = self.place[p as usize];

@@ -39,11 +39,11 @@ use dual::Dual;
 /// side.
 #[derive(Debug, Clone, Copy)]
 pub struct Strip<'a> {
-    /// Number of rows. The seam runs along them.
+    /// Number of rows. The seam crosses all of them.
     pub rows: usize,
     /// Number of columns, at least two.
     pub columns: usize,
-    /// Whether the first row follows the last one.
+    /// If true, the first row follows the last row and the seam is closed.
     pub cyclic: bool,
     /// Cost of separating each pixel from the next one in its row, an array of rows x columns. The last column is
     /// ignored.
@@ -62,7 +62,7 @@ pub struct Seam {
     pub value: u32,
 }
 
-/// Cost of a missing edge, and an unknown distance. The sum of two fits `u32`.
+/// Cost of a missing edge, and an unknown distance. The sum of two such values fits `u32`.
 const NEVER: u32 = u32::MAX >> 1;
 /// Limit of the sum along a whole straight row or column, so that distances do not overflow.
 pub(super) const LONGEST: u64 = 1 << 30;
@@ -71,7 +71,7 @@ const EAST: usize = 0;
 const SOUTH: usize = 1;
 const WEST: usize = 2;
 const NORTH: usize = 3;
-/// Step of a face where a search starts.
+/// Value of `Face::step` where a search starts.
 const START: u8 = 4;
 /// Number of faces taken between checks of the monitor.
 const BREATH: usize = 1 << 14;

@@ -114,7 +114,7 @@ impl Annulus {
                 }
             }
         }
-        // Pixels of the same side are never separated.
+        // Pixels that must be on the same side are never separated.
         let tied = |p: usize, q: usize| sides[p] == sides[q] && sides[p] != Side::Free;
         for p in 0..sides.len() {
             if p + 1 < sides.len() && tied(p, p + 1) {
@@ -201,7 +201,7 @@ impl Annulus {
         faces
     }
 
-    /// Returns the angle of a pixel of this side at a face.
+    /// Returns the angle, in eighths of a turn, from a face to an adjacent pixel of this side.
     fn angle(&self, face: u32, side: Side) -> Option<usize> {
         let (columns, width) = (self.columns, self.columns - 1);
         let (r, c) = (

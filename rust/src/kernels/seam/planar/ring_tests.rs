@@ -105,7 +105,7 @@ fn cases(longest: usize) -> impl Strategy<Value = Case> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// The result must be the same set as that of the maximum flow, including ties.
+    /// The result must equal the sink side of the maximum flow, including ties.
     #[test]
     fn equals_the_maximum_flow(case in cases(12)) {
         if let Some(inside) = least_ring(&case.ring(), &Monitor::default()).unwrap() {

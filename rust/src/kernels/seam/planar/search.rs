@@ -52,9 +52,8 @@ impl Dual {
         }
     }
 
-    /// Finds the shortest paths from the faces in the queue to all faces up to the distance of the
-    /// nearest goal, or up to `last`. `LED` searches are guided by distances ahead and stay between
-    /// two seams.
+    /// Finds the shortest paths from the faces in the queue to all faces up to the distance of the nearest goal, or up
+    /// to `last`. With `LED`, the search is guided by the distances in `ahead` and stays between two seams.
     pub(super) fn search<const LED: bool>(
         &mut self,
         goals: impl Fn(u32) -> bool,
