@@ -1,4 +1,5 @@
-# The public names of texrs and where they live: read by type checkers, and by lazy_loader when texrs is imported.
+# The public names of texrs and their modules. Type checkers read this list, and lazy_loader reads it when texrs is
+# imported.
 from . import (
     elements,
     errors,

@@ -17,8 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run(arguments)
         finally:
             if arguments is None:
-                # The command has finished or cleaned up, so ignore a late Ctrl-C, because the exit code already states
-                # the result.
+                # The command has finished or cleaned up, and its exit code is final, so ignore a late Ctrl-C.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
         print("texrs: stopped; nothing was left half-written", file=sys.stderr)

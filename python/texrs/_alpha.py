@@ -1,4 +1,4 @@
-"""Multiply and divide colours by alpha: they are premultiplied in EXR files, but not in memory."""
+"""Multiply and divide colours by alpha: colours are premultiplied in EXR files, but not in memory."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from texrs._typing import Array
 __all__ = ["adapt", "divide", "has_alpha", "multiply", "undo"]
 
 CLEAR = 0.01
-"""Minimum visible level of a colour, 0 to 1. Smaller colours of transparent pixels are noise."""
+"""Minimum visible level of a colour, 0 to 1. Lower levels in transparent pixels are noise."""
 MOST = 0.5
-"""Fraction of coloured pixels among the pixels with alpha 0, above which a file is not premultiplied."""
+"""Fraction of coloured pixels among the pixels with alpha 0, above which a file is treated as not premultiplied."""
 
 
 def has_alpha(pixels: Array) -> bool:
-    """Return True if the last channel of an image is its alpha, so if it has 2 or 4 channels.
+    """Return True if the last channel of an image is alpha, which is the case for images of 2 or 4 channels.
 
     Examples
     --------

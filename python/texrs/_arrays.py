@@ -104,8 +104,8 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     Raises
     ------
     InvalidInput
-        The values are not numbers, not finite or masked. Also if the image is too small, has the wrong number of axes,
-        or its channels are the first axis.
+        The values are not numbers, not finite or masked. Or the image is too small, has the wrong number of axes, or
+        has its channels as the first axis.
     FileError
         A path cannot be read.
     LimitExceeded
@@ -138,7 +138,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
 
 
 def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
-    """Raise an error for arrays with channels first and for batches: only the first axis is short."""
+    """Raise an error for images with channels first and for batches of them, whose leading axes are short."""
     first = len(shape) - axes - 1
     if first not in (0, 1) or not 0 < shape[first] <= FEW or min(shape[first + 1 :]) < 2 * FEW:
         return
@@ -236,7 +236,8 @@ def check_finite(array: Array, name: str) -> None:
     """
     if array.dtype.kind != "f":
         return
-    # Check parts that fit into the cache, because a mask of all values would take ten times as long.
+    # Check the array part by part, so that each part fits into the cache: a mask of all values takes ten times as
+    # long.
     parts = np.nditer(array, ["external_loop", "buffered", "zerosize_ok"], buffersize=2**15)
     bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
     if bad:
@@ -268,7 +269,7 @@ def to_unit(array: Array) -> Floats:
 def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
     """Return the position of values between two bounds, as a fraction from 0 to 1.
 
-    The difference of the bounds can exceed the range of float64.
+    The difference of the bounds may exceed the range of float64.
     """
     given = values.astype(np.float64)
     if math.isinf(high - low):

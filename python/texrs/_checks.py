@@ -20,7 +20,7 @@ from texrs.limits._estimates import estimate_memory
 FREE = 2**20
 """Maximum size in bytes that is allocated without a check of the available memory.
 
-Such a check takes as long as filling this memory.
+The check takes as long as writing to this number of bytes.
 """
 
 
@@ -45,7 +45,7 @@ def as_size(
     Raises
     ------
     InvalidInput
-        The size is not integers, has the wrong number of entries, or is below ``minimum``.
+        The size does not consist of integers, has the wrong number of entries, or is below ``minimum``.
     LimitExceeded
         The size has more than ``limit`` pixels (by default the limit of `texrs.limits`).
 
@@ -155,7 +155,7 @@ def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...
         try:
             if len(value) == length:
                 return tuple(value)
-        # The value is an array without axes, or a range too long for the memory.
+        # An array without axes has no length, and a range can be too long for its length or for the memory.
         except (TypeError, OverflowError, MemoryError):
             pass
     raise InvalidInput(f"{name}: must be {what}, got {value!r}")
@@ -164,7 +164,7 @@ def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...
 def as_items(value: object, name: str) -> Iterator[Any]:
     """Check that a value is iterable. Its items are read only when they are needed."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
-        with suppress(TypeError):  # The value is an array without axes.
+        with suppress(TypeError):  # An array without axes cannot be iterated.
             return iter(value)
     raise InvalidInput(f"{name}: must be a sequence, got {value!r}")
 
@@ -199,7 +199,7 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
 def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
     """Check that a value is one of some words, numbers and None.
 
-    Its type is checked first, because arrays compare by entry.
+    The type of the value is checked first, because comparing an array gives an array.
     """
     plain = isinstance(value, str | numbers.Integral | None) and not isinstance(value, bool)
     if not plain or value not in allowed:

@@ -16,7 +16,7 @@ COLOURED = {"P": "RGB", "PA": "RGBA", "RGBX": "RGB", "RGBa": "RGBA", "La": "LA",
 WITH_ALPHA = {"L": "LA", "RGB": "RGBA"}
 """PIL modes to which images are converted if one of their colours is marked as transparent."""
 NEAR = 1e-6
-"""Relative tolerance for floats that are compared with the nodata value of a file, which is a rounded text."""
+"""Relative tolerance for floats that are compared with the nodata value of a file, which is stated as rounded text."""
 KEPT = ("1", "L", "LA", "I", "F", "RGB", "RGBA")
 """PIL modes whose numbers are used unchanged, in addition to the modes I;16."""
 

@@ -23,7 +23,7 @@ LEAST = 0.02
 STRONGEST = 1.4
 """Maximum absolute logarithm of the correction factor of encoded values: from 0.25 to 4."""
 BRIGHTEST = 1e15
-"""Maximum value of float colours, so that their light, which is a power of it, stays finite."""
+"""Maximum value of float colours, so that their light (a power of the value) stays finite."""
 TURNS = 3
 """Number of iterations. Each separates bright from dark elements, and then estimates the light from both."""
 BINS = 128
@@ -137,7 +137,7 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
         part = slice(start, min(start + max(1, STRIP // columns), rows))
         seen = encode_srgb(to_light(pixels[part][..., :colours], space)).mean(axis=-1, keepdims=True)
         if pixels.shape[-1] > colours:
-            # Replace transparent pixels by the mean of the others.
+            # Replace transparent pixels by the mean of the others, because their colours are arbitrary.
             there = to_light(pixels[part][..., -1:], "linear")
             mean = (seen * there).sum(axis=(0, 1)) / np.maximum(there.sum(), np.float32(1e-6))
             seen = seen * there + mean * (1 - there)

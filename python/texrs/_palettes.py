@@ -85,7 +85,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
     A path in the arguments is replaced by its image. Arguments that request other colours disable the palette.
     """
     asked, weight, how = _ASKED.get(), given.get("screening"), given.get("interpolation")
-    # The verb reports values of other types later.
+    # Weights of other types are invalid, and the verb itself raises the error.
     wanted = isinstance(weight, int | float) and weight not in (0, usual.get("screening"))
     smooth = isinstance(how, str) and how not in ("nearest", usual.get("interpolation"))
     fading = any(isinstance(value, Mask) and value.feather for value in given.values())

@@ -33,7 +33,7 @@ def takes_materials(
     analysed: bool = False,
     check: Callable[[dict[str, Any]], None] = lambda given: None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a verb take materials as examples. It decides from their guide images, and all maps follow the result.
+    """Let a verb take materials as examples. The verb decides from their guide images, and all maps follow the result.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def takes_materials(
                         [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
                     )
             if lit is True:
-                # The guide image already has even light.
+                # Light is not flattened again, because the guide image already has even light.
                 given.arguments["flatten_lighting"] = False
             made: Any = verb(*given.args, **given.kwargs)
             if lit is True:

@@ -66,9 +66,9 @@ def extend(
         opposite sides. If one side would pass the horizon, the other side takes the rest.
     view : PlaneView or Plane, or a sequence of them, optional
         Position of the plane in the photograph, as far as it is known. The rest is found. If the result is uncertain,
-        or the plane is seen from the front, elements have the size that they have anywhere in the image. Background
-        such as the sky above a floor continues, but objects on the plane do not. Several planes, such as a floor and a
-        wall, continue separately up to the line where they meet. Only one of them may lack a ground.
+        or the plane is seen from the front, patches are copied without a change of scale. Background such as the sky
+        above a floor continues, but objects on the plane do not. Several planes, such as a floor and a wall, continue
+        separately up to the line where they meet. Only one of them may lack a ground.
     boundary_width : int
         Width of the band along the photograph's border that may change to hide the border, in pixels, 0 to 64.
         Default: 0.
@@ -165,7 +165,7 @@ def extend(
             for v, (said, _), ground in zip(views, settled, grounds, strict=True)
         ]
     watch("plane", 1.0)
-    # Everything else is beyond the horizon of the plane.
+    # If no other part of the image, such as a sky, continues, nothing can be added beyond the horizon of the plane.
     alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_), pixels)) == 1
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
@@ -193,7 +193,7 @@ def extend(
         )
     made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
     lit = (-added["top"], -added["left"]) if follow else None
-    # The source is always inside the photograph's borders.
+    # Change the source map from positions on the canvas to positions in the photograph. All sources are inside it.
     places = np.moveaxis(np.indices(sides), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
@@ -231,7 +231,7 @@ def _measure_room(plane: Plane, added: Mapping[str, int], axis: int) -> tuple[in
     corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])], np.float64)
     step = np.zeros(2)
     step[axis] = 1.0
-    # Widths grow linearly along each axis.
+    # Widths of elements change linearly along an axis, so the difference of two widths is the rate everywhere.
     rise = float(np.diff(plane.width(np.stack([np.zeros(2), step])))[0])
     found = []
     for end, sign in ((low, -1), (high, 1)):

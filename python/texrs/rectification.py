@@ -206,7 +206,8 @@ def _choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> floa
             return resolution
         if asked is not None:
             raise InvalidInput(f"resolution: must be at most {most:.3g} for this plane, got {resolution:.3g}")
-        # A coarser resolution makes more of the plane sharp, up to its horizon.
+        # Reduce the resolution by 10 % more than needed, because at a coarser resolution a larger part of the plane is
+        # sharp.
         resolution = 0.9 * most
 
 
@@ -243,11 +244,12 @@ class _FlatSheet:
         sides = (high - low) * resolution
         step = max(1, ceil(float(sides.max()) / SHOWN))
         source, inside = _lay(plane, low, (int(sides[0] / step) + 1, int(sides[1] / step) + 1), resolution / step)
-        # The pixels between the samples must be ground too.
+        # Pixels between the samples of the coarse sheet must also be ground.
         solid = ground if step == 1 or ground.all() else minimum_filter(ground, 2 * step + 1)
         nearest = np.rint(source.coordinates).astype(np.intp)
         inside &= solid[nearest[..., 0], nearest[..., 1]]
-        # The smallest singular value: the minimum number of photograph pixels that a pixel covers.
+        # The smallest singular value of a frame is the minimum number of photograph pixels that a texture pixel
+        # covers.
         frames = source.jacobians()
         squares, area = np.square(frames).sum(axis=(-2, -1)), _cross(frames[..., 0, :], frames[..., 1, :])
         fewest = np.sqrt(np.maximum(squares - np.sqrt(np.maximum(squares**2 - 4 * area**2, 0)), 0) / 2)

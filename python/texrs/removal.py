@@ -34,7 +34,7 @@ edges.
 RIM = 1 / 40
 """Width of the band around the mask that seams may use, as a share of the shorter side."""
 ELEMENT_WIDTH = 1 / 12
-"""The same for separate elements: those that the mask cuts are removed as a whole."""
+"""Width of this band on planes with separate elements, where elements that the mask cuts are removed as a whole."""
 
 
 @takes_materials("image")
@@ -62,8 +62,8 @@ def remove(
         feathered.
     view : PlaneView or Plane, or a sequence of them, optional
         Position of the plane behind the object in the photograph, as far as it is known. The rest is found. If the
-        result is uncertain, or the plane is seen from the front, the filling has the size of elements anywhere in the
-        image. Several planes, such as a floor and a wall, are filled separately. Only one of them may lack a ground.
+        result is uncertain, or the plane is seen from the front, patches are copied without a change of scale. Several
+        planes, such as a floor and a wall, are filled separately. Only one of them may lack a ground.
     margin : int, optional
         Growth of the mask on all sides in pixels, 0 to 64. Default: 1/150 of the shorter side.
     boundary_width : int, optional

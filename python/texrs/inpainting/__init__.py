@@ -274,7 +274,7 @@ def inpaint(
         )
     places, count = made.source, made.count
     new = _find_places(places.label)
-    # Kept pixels map to themselves. Coordinates of patches are integers, except on oblique planes.
+    # Kept pixels are copied from themselves. Coordinates in patches are integers, except on oblique planes.
     result = pictures[0].copy()
     if not made.whole:
         result[new] = places.render(pictures, interpolation="cubic")[new]

@@ -25,9 +25,12 @@ __all__ = ["fill_in_depth", "see_plane"]
 SIDE = 0.6
 """Side of the patches relative to the side for a whole image, because holes are small."""
 TAPS = 5
-"""Number of samples that an interpolated sample uses, and one more. All of them must be known."""
+"""Side, in pixels, of the window around a usable pixel. All pixels of the window must be known.
+
+It is one more than the four samples of a cubic interpolation.
+"""
 AROUND = 2.0
-"""Width of the known band around a hole that patches must fit, in sides of the largest patch."""
+"""Width of the known band around a hole that patches are compared with, in sides of the largest patch."""
 
 
 def see_plane(picture: Array, open_: Bools, scale: Floats) -> Slope | None:
@@ -48,7 +51,7 @@ def fill_in_depth(
     seed: int,
     progress: Progress | None,
 ) -> tuple[SourceMap, float, int] | None:
-    """Fill a hole in depth. Return the source map, the side of the patches and their number.
+    """Fill a hole on an oblique plane. Return the source map, the side of the patches and their number.
 
     Parameters
     ----------
@@ -78,7 +81,7 @@ def fill_in_depth(
     """
     from scipy import ndimage
 
-    # Values that are interpolated from pixels of the hole are unknown.
+    # Do not copy from pixels near the hole, because interpolation would read values from inside the hole.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     if not whole.any():
         return None
@@ -111,7 +114,7 @@ def fill_in_depth(
     identity = SourceMap.identity(open_.shape)
     frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*open_.shape, 2, 2)).copy()
     label = np.zeros(open_.shape, np.uint32)
-    # Use only pixels of patches. Given pixels keep their own coordinates.
+    # Take only the pixels that patches cover. The others keep their own coordinates.
     new = found.patches < len(found.stitched.frames)
     number, count = np.unique(found.patches[new], return_inverse=True)
     identity.coordinates[part][new] = found.coordinates[new]

@@ -1,4 +1,4 @@
-"""Fill one hole: in depth if a plane is visible, else with patches of the image as it is."""
+"""Fill one hole: in perspective if a plane is visible, else with patches of the image as it is."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, b
     source : (h, w, C) float32
         Image that the patches were copied from.
     free : (h, w) bool
-        Its known pixels.
+        Mask of the known pixels of ``source``.
     wrap : (bool, bool)
         Axes along which the image is periodic.
 

@@ -35,7 +35,7 @@ AROUND = 12
 SIZES = (1.0, 0.8, 1.25)
 """Sizes of the copies of the image if there is a scale map. More copies are added if other sizes are requested."""
 NOWHERE = 1e6
-"""Scale of pixels that must not be copied, which is never requested."""
+"""Scale that marks pixels that must not be copied, because no pixel of a hole requests it."""
 
 
 def recover_scale(
@@ -54,7 +54,7 @@ def recover_scale(
         return found.scale, found
     scale, holds = try_array(given), find_kind(given) or scale_kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":
-        # A map may also have a hole where the image has one.
+        # Do not warn about NaN, because the map may also be unknown inside the hole of the image.
         with np.errstate(invalid="ignore"):
             bad = open_ & ~(np.isfinite(scale) & (scale > 0))
         if bad.any() and not bad.all():
@@ -81,13 +81,14 @@ def optimise(
         if min(shape) < LEAST:
             raise InvalidInput(f"{name}: must have at least {LEAST} pixels a side for method 'optimise', got {shape}")
     levels = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
-    # Windows must not extend beyond a copy, except those of known pixels at the border.
+    # Pad the image by the radius of a window at the coarsest level, so that windows of pixels at its border stay
+    # inside the atlas.
     margin = RADIUS << (levels - 1)
     atlas = _make_atlas(pictures, open_, scales, wide, levels, margin)
     region = look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
     row, column = np.mgrid[part]
-    # The image is the first copy in the atlas.
+    # Known pixels have fixed positions in the atlas: their own, because its first copy starts with the image.
     shown = np.stack([row, column], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
     grown = grow_from_atlas(
         atlas,

@@ -29,16 +29,20 @@ PLACES = 64
 SIZES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 3.0, 4.0)
 """Sides of patches that are tried, relative to the usual side."""
 FINE = (0.75, 1.0, 1.5)
-"""The same, relative to the usual side at full size, if a reduced copy is filled."""
+"""Smaller sides that are also tried in a reduced copy, relative to the usual side at full size."""
 STARTS = (1, 5)
 """Indices of the sides that are tried first, from the largest. The neighbours of the best side follow, until none is better.
 This takes half the time of all sides. Seams are 1 % more visible, measured in 75 holes of 22 images."""
 WIDEST = 0.3
 """Maximum side, as a share of the shorter side of the image."""
 CLEARLY = 0.97
-"""Smaller patches are used if the visibility of their seams is below this share of that of larger patches."""
+"""Smaller patches are used if the visibility of their seams, relative to that of larger patches, is below this limit.
+"""
 WITHIN = 1.3
-"""Maximum side, as a share of the side of a square as large as all holes. A larger patch brings its own joints along."""
+"""Maximum side, relative to the side of a square as large as all holes.
+
+A larger patch of a wall would show joints of its own inside the hole.
+"""
 MANY = 256
 """Maximum number of patches that fill the holes. Smaller patches are not tried."""
 COVERS = 0.4
@@ -137,7 +141,8 @@ def try_sides(
         if np.count_nonzero(mark_corners(half.free, 2 * LEAST)) < PLACES:
             break
         small, times = half, 2 * times
-    # List the sides to try, largest first. A reduced image also gets smaller sides, usual ones of the full image.
+    # List the sides to try, largest first. In a reduced copy, also try sides that correspond to usual sides of the
+    # full image.
     usual = choose_usual_side(min(scene.free.shape))
     sides = list_sides(small, choose_usual_side(min(small.free.shape)), SIZES)
     if times > 1:

@@ -35,9 +35,12 @@ Smaller scales are near the horizon.
 FEWEST = 0.02
 """Minimum share of the image outside the planes. A smaller part does not continue behind them."""
 BESIDE = 0.5
-"""Largest nearness of a corner to the camera, relative to the middle, -1 to 1, if the corner shows a part behind the planes."""
+"""Maximum coordinate of a corner along the direction towards the camera, if the corner shows a part behind the planes.
+
+Each axis of the image is from -1 to 1.
+"""
 MOSTLY = 0.8
-"""Share of the pixels around a hole that show one part. The hole then belongs to this part."""
+"""Share of the pixels around a hole that must show the same part. The hole then belongs to this part."""
 ALIKE = 0.15
 """Largest difference of the mean colours, 0 to 1, of regions of one part, such as the sky on both sides of a tower."""
 BAND, NARROWEST, WIDEST = 0.4, 16, 64
@@ -58,13 +61,16 @@ class Part:
     reach: Bools | None = None
     """Mask of the pixels that the part can reach, (H, W). None: all pixels."""
     large: Bools | None = None
-    """(H, W): where enough of it is visible to continue behind other parts; None: everywhere that it is visible."""
+    """Mask of the places where enough of the part is visible to continue behind other parts, (H, W).
+
+    None: everywhere that it is visible.
+    """
 
     @classmethod
     def of(cls, shown: Bools, plane: Plane | None, origin: Sequence[int] = (0, 0)) -> Part:
         """Return the part of an image that shows a plane.
 
-        The image begins at a point (row, column) of the plane's own image.
+        ``origin`` is the position (row, column) of the first pixel in the plane's own image.
         """
         if plane is None:
             return cls(shown)
@@ -73,9 +79,9 @@ class Part:
 
 
 def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> Slope | None:
-    """Return the sizes of elements on a plane, in an image (rows, columns) that begins at a point of the plane's own image.
+    """Return the slope of a plane in an image (rows, columns) that begins at ``origin`` in the plane's own image.
 
-    None: the plane is seen from the front. Pixels beyond its horizon do not count.
+    The result is None if the plane is seen from the front. Pixels beyond its horizon do not count.
     """
     middle = np.array(plane.principal_point) - origin
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], np.float64)
@@ -127,7 +133,8 @@ def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
             like.append(piece)
     found = [Part(np.isin(pieces, group), large=np.isin(pieces, group)) for _, group in groups]
     if found:
-        # The pixels of elements stay in their places.
+        # Pixels of objects on a plane are assigned to the first region, but do not continue: they are not in
+        # ``large``.
         found[0] = Part(found[0].shown | (rest & ~behind[pieces]), large=found[0].large)
     return [*parts, *found]
 
@@ -191,7 +198,7 @@ def fill_parts(
     boundary : int
         Width of the band around the holes that may also change, in pixels.
     element_width : int
-        The same for planes with separate elements.
+        Width of this band on planes with separate elements, in pixels.
     light : bool
         If True, patches are compared and continued as they would look in even light.
     patch : int, optional

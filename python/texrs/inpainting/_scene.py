@@ -28,7 +28,7 @@ class Scene:
     source: Floats
     """Image that patches are copied from, (h, w, C): the same colours, or those of another image."""
     free: Bools
-    """Mask of its pixels that may be copied, (h, w)."""
+    """Mask of the pixels of ``source`` that may be copied, (h, w)."""
     wrap: tuple[bool, bool]
     """Axes along which the image is periodic."""
     _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)

@@ -82,7 +82,7 @@ def _follow_lines(
             first = np.where(both, _measure(places, line[0]) < line[1], first)
         before[one] += first
         before[other] += ~first
-    # If lines do not meet in a point, the nearer part continues.
+    # If several parts are on the right side of equally many lines, the nearest of them continues.
     tied = np.where(before == before.max(axis=0), away, np.inf)
     return np.asarray(tied.argmin(axis=0), np.intp)
 
@@ -108,11 +108,11 @@ def find_line(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[float, fl
 
 
 def _cut(one: NDArray[np.intp], other: NDArray[np.intp], angle: float) -> tuple[float, float, float, float]:
-    """Return the best line across a direction: its wrong pixels minus its free room, the direction, and the distance."""
+    """Return the best line across a direction: its share of wrong pixels, negated gap, direction and distance."""
     values = np.concatenate([_measure(points, angle) for points in (one, other)])
     order = np.argsort(values, kind="stable")
     sign = np.concatenate([np.full(len(one), 1 / len(one)), np.full(len(other), -1 / len(other))])[order]
-    # Shares of both parts on the wrong side of a line after each point.
+    # Entry k is the sum of the shares of both parts that are on the wrong side of a line after point k.
     wrong = np.round(1 - np.cumsum(sign), 9)
     at = int(wrong[:-1].argmin())
     low, high = (float(values[order[k]]) for k in (at, at + 1))

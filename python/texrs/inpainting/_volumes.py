@@ -45,14 +45,19 @@ SMALLEST = 6
 SEEN = 1.2
 """Largest step at the border of a hole that is not visible. Smaller patches are only tried above it."""
 MARGIN = 48
-"""Voxels around the hole that patches are copied from. The search of one patch takes as long as there are voxels."""
+"""Width, in voxels, of the margin around the hole that patches are copied from.
+
+The time to search for a patch is proportional to the number of these voxels.
+"""
 PLENTY = 8
 """Minimum number of voxels that patches are copied from, relative to the voxels of the hole, if the volume allows it."""
 CANDIDATES, RECOVER = {False: 16, True: 48}, 2.0
-"""Places that are tried for a patch: more for labels, because their seams cannot be corrected. Patches that cover the worst
-seams again, as a share of all."""
+"""Number of places that are compared for a patch, and number of patches that replace the worst seams, as a share of all.
+
+More places are compared for labels, because their seams cannot be corrected.
+"""
 FORBIDDEN = 5.0
-"""Cost of a sample in the hole, relative to a point that does not follow a guide."""
+"""Weight of the guide, which gives samples in the hole a high cost."""
 BLEND = 0.1
 """Default weight of the values in the correction, which then fades within about three voxels."""
 SWEEPS, RELAXED = (40, 400), 1.6
@@ -298,7 +303,7 @@ def stitch(
     exemplar: Exemplar, hole: Bools, wide: Bools, side: int, seed: int, progress: Progress | None
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32], NDArray[np.int16], float]:
     """Return the voxel that each voxel is copied from (D, H, W, 3), its patch (0: itself), the frames, and the seam cost."""
-    # Patches extend beyond the hole by up to their side.
+    # Include a margin of one patch, because patches may extend beyond the hole by up to their side.
     part = find_box(wide, side)
     here = hole[part]
     region = Region.whole(here.shape, (False,) * 3)
@@ -361,7 +366,8 @@ def correct_seams(
         low, high = (tuple(s if a == axis else slice(None) for a in range(3)) for s in (slice(-1), slice(1, None)))
         slopes = np.zeros((*at[low].shape[:3], colours.shape[-1]))
         seen = np.zeros((*at[low].shape[:3], 1))
-        # Average the difference at the source of one voxel and at the source of the other one.
+        # The requested difference of two voxels is the mean of two differences: at the source of one voxel, and of the
+        # other.
         for start, step in ((at[low], 1), (at[high], -1)):
             beside = start.copy()
             beside[..., axis] = np.clip(beside[..., axis] + step, 0, ends[axis] - 1)
@@ -377,7 +383,7 @@ def correct_seams(
         wanted[high] += slopes
         pairs.append((low, high, counts))
     x = colours[box].copy()
-    # Voxels of one colour of a chessboard have no neighbour of the same colour.
+    # Update the voxels of one colour of a chessboard at once, because none of them are neighbours.
     odd = np.indices(shape).sum(axis=0) % 2 == 1
     sweeps = round(min(SWEEPS[1], max(SWEEPS[0], 12 / sqrt(weight))))
     for sweep in range(sweeps):

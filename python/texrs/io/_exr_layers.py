@@ -67,7 +67,7 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
     found = []
     with translate_errors(path, "decoding"):
         file = _open(path)
-        # The package omits damaged parts.
+        # The package omits damaged parts, so a different number of parts means a damaged file.
         if len(file.parts) != len(heads):
             raise FileError(f"{path}: is cut off or corrupt; some of its pixels are missing")
         for number, head in enumerate(heads):

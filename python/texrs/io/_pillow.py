@@ -199,7 +199,8 @@ def _find_density(kind: str, info: dict[str, Any], exif: Any) -> tuple[float, fl
     if kind != "jpeg" and "dpi" in info:
         unit, steps = 1, info["dpi"]
     elif unit not in (1, 2):
-        # Exif counts units from 2. Ignore a density of one pixel per inch: many programs write it as a placeholder.
+        # Units in Exif are larger by 1 than in JFIF. Ignore a density of one pixel per inch, which many programs write
+        # as a placeholder.
         unit, steps, least = int(exif.get(UNIT, 2)) - 1, (exif.get(ACROSS, 0), exif.get(DOWN, 0)), 1 / INCH
     across, down = (float(step) / (INCH if unit == 1 else 0.01) for step in steps or (0, 0))
     return (down, across) if unit in (1, 2) and least < min(across, down) and max(across, down) < 1e9 else None

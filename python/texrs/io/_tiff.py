@@ -34,7 +34,8 @@ _UNFOLDING: dict[int, float] = {
 }
 """Maximum ratio of unpacked to packed bytes for each compression.
 
-The ratio of PackBits, 64, is multiplied by nine, because tifffile keeps unpacked bytes in a list of nine bytes each.
+The ratio of PackBits, 64, is multiplied by nine, because tifffile keeps unpacked bytes in a list that needs nine bytes
+for each.
 """
 _PICTURES = frozenset({6, 7, 33003, 33004, 33005, 34712, 34933, 50001})
 """Compressions whose strips and tiles are JPEG, JPEG 2000, PNG or WebP files."""
@@ -90,9 +91,9 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         try:
             array = series.asarray(maxworkers=1)
         except Exception as error:
-            # Only while decoding, tifffile finds that a predictor or sample width needs imagecodecs, and imagecodecs
-            # rejects padded strips. Pillow reads both. Do not use it for corrupt strips, because it prints a line for
-            # each.
+            # tifffile notices only while decoding that a predictor or sample width needs imagecodecs, which also
+            # rejects padded strips. Pillow reads both. Other errors mean corrupt strips, for which Pillow would print
+            # a line each.
             reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
             if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
                 raise

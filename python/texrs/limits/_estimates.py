@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from texrs.errors import InvalidInput
 
 if TYPE_CHECKING:
-    # Importing it at run time would import NumPy.
+    # Import the type only for type checkers, because the import would load NumPy.
     from numpy.typing import DTypeLike
 
 __all__ = ["estimate_memory"]

@@ -203,9 +203,9 @@ def list_conventions() -> str:
 def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
     """Return the roles that the file names of a folder give, and the reason for each uncertain role.
 
-    First, words at the end of a name give the role (see `guess_role`). Next, short endings do if other names confirm
-    them, as in Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name with which other
-    names begin is the colour map (``rock`` next to ``rock_normal``).
+    First, words at the end of a name give the role (see `guess_role`). Next, short endings give it if other names
+    confirm them, as in Unreal (``T_Rock_N``) and labPBR (``stone``, ``stone_n``, ``stone_s``). Last, a name with which
+    other names begin is the colour map (``rock`` next to ``rock_normal``).
     """
     found = {stem: each[0] for stem in stems if (each := find_role(stem)) is not None}
     why: dict[str, str] = {}

@@ -269,7 +269,7 @@ def _take_set(laid: UnwrappedMesh, number: int) -> tuple[NDArray[np.float64], ND
     """Return the vertices, faces and UVs (0 to 1) of a texture set."""
     surface, mine = laid.surface, laid.which == number
     assert surface.uv is not None
-    # All faces of a set are in the same tile.
+    # All faces of a set are in the same tile, so one offset moves their UVs to the range 0 to 1.
     return surface.vertices, surface.faces[mine], surface.uv - laid.tile[mine][0]
 
 

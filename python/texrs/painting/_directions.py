@@ -201,7 +201,7 @@ def _bend(
     line = np.einsum("na,nad->nd", vectors[np.arange(len(points)), :, chosen], axes)
     clear = np.abs(np.abs(curves[:, 0]) - np.abs(curves[:, 1]))
     clear = clear / max(float(np.quantile(clear, 0.9)), 1e-300)
-    # If both curvatures are similar, the line is unclear, so it follows the neighbours.
+    # If both curvatures are similar, the direction is unclear and has a low weight, so that it follows the neighbours.
     count = np.minimum(clear, 1) ** 2
     own = count[:, np.newaxis, np.newaxis] * np.einsum("ni,nj->nij", line, line)
     found = own
@@ -230,7 +230,7 @@ def _agree(points: Floats64, near: tuple[NDArray[np.intp], Floats64], lines: Flo
     rows = np.repeat(np.arange(count), index.shape[1])
     columns, good = index.reshape(-1), weight.reshape(-1) > 0
     dots = (lines[rows] * lines[columns]).sum(axis=1)
-    # Parallel lines are close in the graph. Rounding makes the tree independent of the processor.
+    # Edges between parallel directions have low costs. Rounding makes the tree independent of the processor.
     cost = 1.001 - np.round(np.abs(dots), DIGITS)
     graph = coo_matrix((cost[good], (rows[good], columns[good])), shape=(count, count)).tocsr()
     tree = minimum_spanning_tree(graph.maximum(graph.T))

@@ -12,7 +12,7 @@ from texrs.painting._surface import Floats64, Surface
 __all__ = ["find_normals", "find_tangents", "shade", "unwrap"]
 
 CREASE = 0.5
-"""Cosine of the angle between faces above which their common edge is sharp: 60 degrees."""
+"""Cosine of the largest angle (60 degrees) between two faces whose common edge is smooth."""
 
 
 def unwrap(
@@ -62,7 +62,7 @@ def find_normals(vertices: Floats64, faces: NDArray[np.int64]) -> Floats64:
     np.add.at(own, faces.reshape(-1), np.repeat(across, 3, axis=0))
     own /= np.maximum(np.sqrt((own**2).sum(axis=1, keepdims=True)), 1e-300)
     place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    # Each corner of a face counts for all vertices at the same position.
+    # List each corner of a face for all vertices at its position.
     spot, face = place[faces].reshape(-1), np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(spot, kind="stable")
     spot, face = spot[order], face[order]

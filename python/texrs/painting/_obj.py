@@ -41,7 +41,7 @@ def read_obj(name: str, text: str) -> Surface:
         try:
             if word in rows:
                 coloured |= word == "v" and len(rest) >= 6
-                # A one-dimensional UV has no second coordinate.
+                # A one-dimensional UV has no second coordinate, so append 0.
                 width, rest = (2, [*rest, "0"]) if word == "vt" else (3, rest)
                 rows[word].append([float(rest[k]) for k in range(width)])
             elif word == "f":

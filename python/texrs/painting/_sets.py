@@ -64,7 +64,7 @@ def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> Unwra
         bare = np.asarray(np.isnan(surface.uv[surface.faces]).any(axis=(1, 2)), bool)
     if bare.all():
         vertices, faces, uv, kept = unwrap(surface.vertices, surface.faces, side, padding)
-        # The text of a file has other corners than the new layout.
+        # Drop the text of the OBJ file, because its indices do not fit the new layout.
         whole = surface._replace(vertices=vertices, faces=faces, uv=uv, text=None, origin=None)
         whole = whole._replace(normals=None if surface.normals is None else surface.normals[kept])
         return UnwrappedMesh(whole, (PAINTED,), np.zeros(len(faces), np.int64), np.zeros((len(faces), 2)))

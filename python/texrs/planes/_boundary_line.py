@@ -30,13 +30,13 @@ EVEN = 0.05
 BETTER, COLOURED = 0.8, 0.1
 """Minimum gain of two slow changes over one slow change: from ratios and contrasts, and from ratios and brightness.
 
-A gain is a sum of logarithms of the ratio of residuals. The second limit excludes the far end of a floor, where only
-the contrast falls.
+A gain is a sum of logarithms of ratios of residuals. The second limit excludes the far end of a floor, where only the
+contrast falls.
 """
 
 
 def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools | None:
-    """Return the larger side of the line across which the windows change abruptly, or None if there are none.
+    """Return the larger side of the line across which the windows change abruptly, or None without an abrupt change.
 
     Each window has five facts (H, W, 5): the means of three colours and of two bands of squared detail. `reach` is the
     standard deviation of the windows in pixels.

@@ -55,13 +55,13 @@ def see(pixels: Array, view: PlaneView) -> Seen:
 
 
 def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
-    """Return the plane and whether it was found; None and a warning if it is uncertain, None if seen from the front."""
+    """Return the plane and whether it was found. None replaces a plane that is uncertain or seen from the front."""
     if said is not None:
         return (None if said.slant < FLAT else said), False
     try:
         seen = find(pixels, fov=fov, known=ground)
     except InvalidInput:
-        # Too few pixels are known.
+        # Too few pixels are known to find a plane, so treat it as seen from the front.
         return None, False
     if seen.confidence < SURE:
         warnings.warn(

@@ -137,7 +137,7 @@ def look(grey: Floats, known: Bools, focal: float) -> tuple[Reals, float]:
     side = max(grey.shape)
     starts = [np.zeros(2) for _ in FINE]
     if side >= HALVED:
-        # Start each band separately, because a band that starts at the end of another agrees with it too soon.
+        # Start each band separately: a band that started from the result of another band would agree with it too soon.
         small, whole = _shrink(grey[..., np.newaxis], known, 2)
         levels = blur_levels(small[..., 0])
         starts = [follow(levels, whole, sigma, at, FIRST)[0] / 2 for sigma, at in zip(FINE, starts, strict=True)]

@@ -231,7 +231,7 @@ def fit(
         own = np.abs(rest[weight > 0.1 * weight.max()])
         spread = np.clip(1.4826 * np.median(own, axis=0), least, LOOSE * least)
         off = measure_off(rest, spread)
-        # Tukey's biweight.
+        # Reduce the weight of outliers by Tukey's biweight.
         weight = np.square(np.maximum(0, 1 - off / FAR**2))
     return coefficients, spread
 

@@ -213,7 +213,7 @@ def _measure(
     length, across = np.sqrt(12 * (middle + half)), np.sqrt(np.maximum(middle - half, 0))
     angle = 0.5 * np.arctan2(2 * yx, yy - xx)
     ways = np.stack([np.cos(angle), np.sin(angle)], -1)
-    # A part whose slopes are not perpendicular to it is a row of other borders.
+    # Skip parts whose slopes are not perpendicular to them, because they are rows of other borders.
     mean = np.stack([add_up(slopes[:, 0]), add_up(slopes[:, 1])], -1)
     askew = np.abs((ways * mean).sum(axis=-1)) / np.maximum(np.hypot(*mean.T), 1e-12)
     good = chosen & (length >= SHORTEST) & (across <= THIN + 0.01 * length) & (askew <= ASKEW)
@@ -290,7 +290,8 @@ class _Mixture:
 
     def step(self) -> tuple[Reals, Reals]:
         """Assign lines to directions; return the normal matrix and right-hand side for the change of rise and angles."""
-        # Density in the image, at the direction of each line, of random directions on the plane.
+        # Compute the density of random directions on the plane, as they appear in the image at the direction of each
+        # line.
         flat = self._flatten(self.ways)
         aside = self._flatten(np.stack([-self.ways[:, 1], self.ways[:, 0]], axis=-1))
         turned = np.abs(flat[:, 0] * aside[:, 1] - flat[:, 1] * aside[:, 0])

@@ -226,7 +226,7 @@ class Plane:
             raise InvalidInput("corners: must form a convex quadrilateral; give the corners in order around it")
         lifted = lift(given, size)
         lines = [np.cross(lifted[i], lifted[(i + 1) % 4]) for i in range(4)]
-        # Opposite sides meet in a vanishing point.
+        # Opposite sides of the rectangle meet in a vanishing point.
         return cls._of_directions(
             size, np.array([np.cross(lines[1], lines[3]), np.cross(lines[0], lines[2])]), "corners", fov
         )
@@ -322,7 +322,7 @@ class Plane:
                 found = 2 * degrees(atan(long_ / 2 / squared**0.5))
                 fov = found if 5 <= found <= 150 else None
         plane = cls._of_line(size, np.cross(*points), name, fov)
-        # Angles of both directions on the flattened plane.
+        # Compute the angles of both directions on the flattened plane.
         ways = [plane._affine @ (p[:2] / np.linalg.norm(p)) for p in points]
         angles = [degrees(np.arctan2(-way[0], way[1])) for way in ways]
         # Rotate by the first direction, to the nearer axis: a column or a row.
@@ -349,7 +349,7 @@ class Plane:
             raise InvalidInput(
                 f"{name}: must give a slant of at most {MAX_SLANT:.0f} degrees, got {slant:.1f}; the plane is seen edge on"
             )
-        # Depth grows where the scale falls.
+        # The tilt is the direction of increasing depth, opposite to the growth of the scale.
         tilt = degrees(np.arctan2(rise[0], -rise[1])) if steep > FLAT / max(size) else 90.0
         return cls((size[0], size[1]), to_digits(slant), to_digits(tilt), to_digits(angle), 0.0, confidence)
 

@@ -1,7 +1,7 @@
 """Measure the size of elements all over an image: on a plane, on a curved surface, or on any other surface.
 
 If no plane fits, several independent methods measure the sizes: fine and coarse patterns (`_patterns`), and masks of
-pixels that are lighter than their surroundings. The masks have several limits of the smallest feature. A single mask
+pixels that are lighter than their surroundings. The masks differ in the size of their smallest feature. A single mask
 may be misleading. It may mark gaps in one part of an image and elements in another, or only grain where elements are
 large. Its sizes may then change in the wrong direction. Therefore the result is the mean of the largest group of maps
 that agree. If no maps agree, sizes remain unknown.
@@ -154,7 +154,7 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
         sure = plane.confidence >= SURE
         voices = list_patterns(pixels, there, plane if sure else Plane(size, 0.0))
     except InvalidInput:
-        # The image, or its known part, is too small for patterns. A mask may still be possible.
+        # The image, or its known part, is too small for patterns, but a mask may still be possible.
         plane, sure, voices = None, False, []
     if plane is not None and sure and not bends(plane, voices):
         return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
@@ -171,7 +171,7 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
     agreed, confidence = agree(said)
     confidence = float(f"{confidence * weigh_bands(said[: len(voices)]):.3g}")
     if confidence < SURE and plane is not None and sure:
-        # The surface may be bent, but the methods do not agree in its shape, so keep the plane.
+        # The surface may be bent, but the methods do not agree on its shape, so keep the plane.
         return ScaleEstimate(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
     if confidence < SURE:
         return ScaleEstimate(ScaleMap(np.ones(size, np.float32), "area"), "even", None, confidence)
@@ -221,7 +221,7 @@ def list_masks(pixels: Array, known: Bools) -> list[Floats]:
             mask = scale_maps.auto_mask(pixels, min_feature_size=times * finest, trend="quadratic", known=known)
             found.append(log_single(scale_maps.from_mask(mask, known=known)))
         except InvalidInput:
-            # No feature is so coarse. Continue with the masks of other limits.
+            # The image has no features of this size, so continue with the next size.
             continue
     return found
 

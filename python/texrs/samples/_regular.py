@@ -83,7 +83,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
     tones = palette(
         "7a4233", "8a5340", "6a382d", "965f45", "5a3a33", "a06c50", "744a3d", "94806b", "6f635b",
     )  # fmt: skip
-    # Half the height and width of a brick without its joints.
+    # Compute half the height and width of a brick without its joints.
     half = (tall / 2 - _JOINT / 2, long / 2 - _JOINT / 2)
     for course in range(courses):
         for k in range(across):
@@ -93,7 +93,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
             dy = np.abs(window.y + bend[0][rows, cols] + rng.uniform(-0.3, 0.3))
             dx = np.abs(window.x + bend[1][rows, cols] + rng.uniform(-0.5, 0.5))
             ey, ex = (np.float32(half[0]) - dy), (np.float32(half[1]) - dx)
-            # Distance to the outline of a box whose corners have a radius of 2.5 pixels.
+            # Compute the distance to the outline of a box whose corners have a radius of 2.5 pixels.
             out = single(np.hypot, np.maximum(2.5 - ey, 0), np.maximum(2.5 - ex, 0))
             edge = np.where((ey < 2.5) | (ex < 2.5), 2.5 - out, np.minimum(ey, ex))
             edge = edge.astype(np.float32)

@@ -166,7 +166,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     period = shape if as_bool(wrap, "wrap") else tuple(32 * -(-n // 32) for n in shape)
     counts = [2 * max(round(n / 32), 1) for n in period]
-    # Coordinates in units of layers and yarns, slightly bent.
+    # Compute coordinates in units of layers and yarns, and bend them slightly.
     z, y, x = (
         at * np.float32(c / n) + np.float32(0.05) * clouds(period, rng, coarse=40, fine=12)
         for at, n, c in zip(np.ogrid[tuple(slice(0, n) for n in period)], period, counts, strict=True)

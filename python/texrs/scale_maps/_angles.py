@@ -74,14 +74,14 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     lean = radians(as_float(slant, "slant", 0, MAX_SLANT))
     angle = radians(as_float(tilt, "tilt", -1e6, 1e6) % 360)
     right, up = cos(angle), sin(angle)
-    # At multiples of 90 degrees one component is only a rounding error.
+    # At multiples of 90 degrees, one component is only a rounding error, so set it to 0.
     right, up = (0.0 if abs(c) < 1e-12 else c for c in (right, up))
     rows, columns = (np.arange(n) - (n - 1) / 2 for n in size)
     # Y_proj of equation 4 is the distance along the slope from the middle of the image.
     far = columns * right - rows[:, np.newaxis] * up
     if fov is None:
-        # Y_max of equation 3 is the distance of the extreme corners. An image of one pixel has no slope, so any value
-        # above 0 will do.
+        # Y_max of equation 3 is the distance of the extreme corners. It is 0 in an image of one pixel, so replace it
+        # by 1.
         reach = (size[1] - 1) / 2 * abs(right) + (size[0] - 1) / 2 * abs(up) or 1.0
         largest, least = 1 / cos(lean), cos(lean)
         scale = largest - (far + reach) * ((largest - least) / (2 * reach))

@@ -180,7 +180,7 @@ def _duplicate(logs: Floats, region: object, to: object, mode: object = "copy", 
     inside = weights(region, feather, logs.shape)
     if not inside.any():
         raise InvalidInput(f"region must be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels")
-    # The source would be outside the map for the rest of the target, so that part stays unchanged.
+    # Copy only the part whose source is inside the map. The rest of the target does not change.
     there = [slice(max(0, d), min(n, n + d)) for d, n in zip(step, logs.shape, strict=True)]
     here = [slice(max(0, -d), min(n, n - d)) for d, n in zip(step, logs.shape, strict=True)]
     if any(s.stop <= s.start for s in there):

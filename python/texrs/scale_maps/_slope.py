@@ -73,7 +73,7 @@ class Slope:
             return None
         rows, columns = scale.shape
         middle = (rows - 1) / 2, (columns - 1) / 2
-        # Fit only where the surface is not clipped near the horizon: it is linear there.
+        # Fit only the part that is not clipped near the horizon, because only there is the surface linear.
         y, x = (np.arange(n) - m for n, m in zip(scale.shape, middle, strict=True))
         open_ = surface > 1.01 * least
         basis = np.stack(np.broadcast_arrays(1.0, y[:, np.newaxis], x), axis=-1)[open_]
@@ -85,7 +85,8 @@ class Slope:
         slope = hypot(*rise)
         if not at > HORIZON * largest or slope <= 0:
             return None
-        # Round the direction, not the components alone: for a level plane they are pure noise and would keep it.
+        # Round the direction to decimals, because a component that should be 0 is noise, which significant digits
+        # would keep.
         down = round(rise[0] / slope, 9) + 0.0, round(rise[1] / slope, 9) + 0.0
         down = down[0] / hypot(*down), down[1] / hypot(*down)
         # Round the residual too, because the last bits of exponentials and logarithms also depend on the processor.

@@ -38,8 +38,8 @@ def as_trend(value: object) -> str:
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     """Fit a trend robustly to the known logarithms of a map, and return its logarithms at every pixel.
 
-    The result is clipped to a quarter of the smallest and to four times the largest known scale. Nothing is visible
-    closer to the horizon. The trend "none" is the median.
+    The result is clipped to a quarter of the smallest and to four times the largest known scale. Parts of a plane that
+    would have smaller scales are too close to the horizon. The trend "none" is the median.
     """
     size = logs.shape
     places = _thin_out(np.ones(size, np.bool_) if known is None else known)

@@ -410,7 +410,8 @@ def _join_ends(
     kept = [min(n, 2 * m) if cyclic else m for n, m, cyclic in zip(shape, wanted, wrap, strict=True)]
     corner = [(n - m) // 2 for n, m in zip(shape, kept, strict=True)]
     part = tuple(slice(low, low + n) for low, n in zip(corner, kept, strict=True))
-    # Flat index of the image pixel that each result pixel is copied from. Its label is the number of its piece.
+    # Each pixel of the result has the flat index of the image pixel that it is copied from, and the label of its
+    # piece.
     place = np.arange(shape[0] * shape[1]).reshape(shape)[part]
     label: NDArray[np.uint32] = np.zeros(place.shape, np.uint32)
     found: dict[int, Joined] = {}

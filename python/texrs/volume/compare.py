@@ -186,8 +186,8 @@ def compare(
         Classes or labels whose connected components are measured. Default: the lighter half of the classes, or all
         labels except 0.
     axes : int, optional
-        Number of spatial axes, 2 or 3. The last of three axes contains channels if it has up to 4 entries. Default:
-        from the shape.
+        Number of spatial axes, 2 or 3. Default: from the shape. An array of three axes is an image with channels if
+        its last axis has at most 4 entries, and otherwise a volume.
     spacing : sequence of float, optional
         Distances between samples along each axis, for both arrays, in any unit. Correlations, paths, sizes,
         orientations and the field then use this unit. Frequencies remain in cycles per sample. Default: the spacing

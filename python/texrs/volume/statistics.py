@@ -65,8 +65,8 @@ class Classes:
         image : (H, W[, C]) or (D, H, W[, C]) array_like
             Image or volume with the channels of the exemplar.
         axes : int, optional
-            Number of spatial axes, 2 or 3. The last of three axes contains channels if it has up to 4 entries.
-            Default: from the shape.
+            Number of spatial axes, 2 or 3. Default: from the shape. An array of three axes is an image with channels
+            if its last axis has at most 4 entries, and otherwise a volume.
 
         Returns
         -------
@@ -101,8 +101,8 @@ class Classes:
         image : (H, W[, C]) or (D, H, W[, C]) array_like
             Image or volume with the channels of the exemplar.
         axes : int, optional
-            Number of spatial axes, 2 or 3. The last of three axes contains channels if it has up to 4 entries.
-            Default: from the shape.
+            Number of spatial axes, 2 or 3. Default: from the shape. An array of three axes is an image with channels
+            if its last axis has at most 4 entries, and otherwise a volume.
 
         Returns
         -------
@@ -215,8 +215,8 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     count : int
         Number of classes, 2 to 16. If the exemplar has fewer colours, each colour is a class. Default: 4.
     axes : int, optional
-        Number of spatial axes, 2 or 3. The last of three axes contains channels if it has up to 4 entries. Default:
-        from the shape.
+        Number of spatial axes, 2 or 3. Default: from the shape. An array of three axes is an image with channels if
+        its last axis has at most 4 entries, and otherwise a volume.
 
     Returns
     -------
