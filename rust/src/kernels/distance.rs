@@ -45,7 +45,7 @@ pub fn outlines(
             format!("must have at least 1 pixel along each axis, got shape {shape:?}"),
         ));
     }
-    // Check the windows, then measure each piece in a task of its own.
+    // Check the windows, then compute the distances of the pieces in parallel.
     let fits = |n: &usize| (1..=MOST).contains(n);
     if let Some(piece) = pieces.iter().find(|p| !p.shape.iter().all(fits)) {
         return Err(Error::value(
@@ -84,8 +84,7 @@ fn cut_out(labels: &[i32], shape: [usize; 2], piece: &Piece) -> Vec<bool> {
     mine
 }
 
-/// Returns the signed distances of the pixels of a window, or `None` if all or no pixels are
-/// marked.
+/// Returns the signed distances of the pixels of a window, or `None` if all or none of them belong to the piece.
 fn measure(mine: &[bool], shape: [usize; 2]) -> Option<Vec<f32>> {
     if mine.iter().all(|m| *m) || !mine.contains(&true) {
         return None;
@@ -103,7 +102,7 @@ fn measure(mine: &[bool], shape: [usize; 2]) -> Option<Vec<f32>> {
 
 /// Returns the squared distance of each pixel to the nearest pixel whose flag equals `mark`.
 fn squares(mine: &[bool], [rows, columns]: [usize; 2], mark: bool) -> Vec<i64> {
-    // Value larger than any distance to a mark.
+    // This value exceeds every distance between two pixels of the window.
     let far = (rows + columns) as i64;
     let mut along = vec![far; mine.len()];
     for row in 0..rows {

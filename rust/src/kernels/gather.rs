@@ -13,7 +13,7 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Number of output pixels in each parallel task. A call with at most this many pixels needs no thread pool.
+/// Number of output pixels in each parallel task. A call with at most this many pixels does not need the thread pool.
 pub const CHUNK: usize = 4096;
 
 /// Interpolation between samples.
@@ -216,7 +216,7 @@ impl Taps {
 /// Every `f32` of at least this size is an integer.
 const WHOLE: f32 = (1 << 23) as f32;
 
-/// Returns the largest integer that is not above a number. A call of `f64::floor` costs more.
+/// Returns the largest integer that is not above a number. This is cheaper than a call of `f64::floor`.
 #[inline(always)]
 fn floor(x: f64) -> isize {
     let cast = x as isize;
@@ -350,8 +350,8 @@ mod tests {
         let data = [1.0f32, 2.0, 4.0, 8.0];
         for how in [Interpolation::Linear, Interpolation::Cubic] {
             for (far, row) in [(3e38, [4.0, 8.0]), (-3e38, [1.0, 2.0]), (1e19, [4.0, 8.0])] {
-                // One coordinate is between samples; the other is so large that a row cannot be
-                // distinguished from the next.
+                // One coordinate is between samples. The other is so large that `f32` cannot distinguish adjacent
+                // rows.
                 let found = at(&data, [2, 2], false, [far, 0.5], how);
                 assert!((row[0]..=row[1]).contains(&found), "{found} at {far}");
             }

@@ -38,7 +38,7 @@ struct Channel {
 }
 
 impl Correlation {
-    /// Prepares a planar `image`, whose channels of `shape` follow each other.
+    /// Prepares a planar `image`: channels of `shape`, one after the other.
     pub fn new(image: &[f32], shape: [usize; 2]) -> Result<Self> {
         let points = shape[0] * shape[1];
         if points == 0 || image.is_empty() || !image.len().is_multiple_of(points) {

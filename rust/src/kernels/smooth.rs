@@ -134,7 +134,7 @@ fn pass<T: Number>(
     let length = memory::product("weights", &[2, reach])?.saturating_add(count);
     // Check that the buffers of all threads fit into memory.
     memory::room(what, length.saturating_mul(LANES), 8 * par::threads())?;
-    // Find the source of each value of the extended axis once.
+    // Compute the source index of each position of the extended axis only once.
     let mut source: Vec<u32> = memory::filled(what, u32::MAX, length)?;
     for (i, source) in source.iter_mut().enumerate() {
         if let Some(at) = axis.edge.find(i as i64 - reach as i64, count) {

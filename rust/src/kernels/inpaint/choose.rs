@@ -1,5 +1,5 @@
-//! Choice of the matches that are cut into a window. Matches that would repeat or mirror their
-//! neighbourhood cost more.
+//! Choice of the matches that are tried for a window. Matches that would repeat or mirror their neighbourhood cost
+//! more.
 //!
 //! A greedy choice tends to repeat recent patches or to mirror its neighbourhood, because both fit well. Both are easy
 //! to see. The cost of a match therefore grows with the share of it that the neighbourhood already contains, at
@@ -13,19 +13,19 @@ use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Pick};
 use crate::{Error, Result};
 
-/// Distance, in patch sides, up to which a repetition is charged.
+/// Distance, in patch sides, up to which a repetition increases the cost of a match.
 const REACH: usize = 2;
 /// Maximum difference, in pixels, between the positions of a match and of the continuation of an earlier patch. A
 /// match with a larger difference is a repetition.
 const STRETCH: isize = 2;
-/// Charge, relative to the cost of a match, if its whole area is repeated.
+/// Relative increase of the cost of a match whose whole area is repeated.
 const REPEATED: f64 = 1.0;
-/// Charge, relative to the cost of a match, if its whole area is mirrored.
+/// Relative increase of the cost of a match whose whole area is mirrored.
 const MIRRORED: f64 = 3.0;
 /// Number of matches that are searched for each requested match.
 const SPARE: usize = 2;
-/// Maximum number of matches that are cut. A cut takes longer than a search, and a worse match
-/// seldom gives a better cut.
+/// Maximum number of matches whose cuts are computed. A cut takes longer than a search, and a worse match seldom gives
+/// a better cut.
 const TRIED: usize = 3;
 
 /// Chooses among the positions of the exemplars.
@@ -48,7 +48,7 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// Returns the matches to cut into a window, at least one.
+    /// Returns the matches whose cuts are compared for a window, at least one.
     pub(super) fn matches(
         &self,
         window: &Window,
@@ -80,8 +80,8 @@ impl<'a> Chooser<'a> {
         Ok(found)
     }
 
-    /// Returns the charge for the share of a match that its neighbourhood already contains, at another offset or
-    /// mirrored.
+    /// Returns the relative increase of the cost of a match. It grows with the share of the match that its
+    /// neighbourhood already contains, at another offset or mirrored.
     fn charge(&self, found: &Match, to: [usize; 2], pasted: &[Patch]) -> f64 {
         let patch = self.options.patch;
         let (of, flip) = self.turned[found.exemplar];

@@ -1,4 +1,5 @@
-//! Exemplar-based filling of holes: from the rim inwards, the best matching patch is cut into the known pixels.
+//! Exemplar-based filling of holes: from the rim inwards, the best matching patch is joined to the known pixels by a
+//! minimum cut.
 //!
 //! The method follows Criminisi, Perez and Toyama (*Region filling and object removal by exemplar-based inpainting*,
 //! IEEE TIP 2004). Patches are pasted by the graph cuts of Kwatra et al. (*Graphcut textures*, SIGGRAPH 2003). Shen et
@@ -7,8 +8,8 @@
 //! 1. take the unknown pixel with the most known pixels around it, and the window over it whose known fraction is
 //!    nearest to 0.6;
 //! 2. find good matches of the known pixels in the window, with the largest weights near the hole;
-//! 3. increase the cost of matches that would repeat or mirror their neighbourhood, and choose the match with the
-//!    cheapest cut into the known pixels;
+//! 3. increase the cost of matches that would repeat or mirror their neighbourhood, and choose the match whose minimum
+//!    cut is cheapest;
 //! 4. paste this match, and repeat until no hole is left.
 //!
 //! The literal method visits unknown pixels in scan order, centres the window on the pixel and takes the best match at
@@ -51,8 +52,8 @@ const FLAT: f32 = 0.025;
 pub struct Options {
     /// Rows and columns of a patch.
     pub patch: [usize; 2],
-    /// Choice of the matches that are considered. The literal method tries the cut of each of them, the default method
-    /// only of the three most promising.
+    /// Choice of the matches that are considered. The literal method computes the cut of each of them, the default
+    /// method only of the three most promising.
     pub pick: Pick,
     /// Seed for the patches of windows without known pixels.
     pub seed: u64,

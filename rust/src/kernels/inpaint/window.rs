@@ -1,4 +1,4 @@
-//! The window of the canvas that is being filled: its known pixels, and the cut of a match into it.
+//! The window of the canvas that is being filled: its known pixels, and the minimum cut between them and a match.
 
 use super::{Canvas, FAR_WEIGHT, FLAT, Inpainting, KEPT_WEIGHT, Patch};
 use crate::Result;
@@ -107,8 +107,8 @@ impl Window {
         }
     }
 
-    /// Returns the cost of cutting in a match, and a flag for each pixel: whether it takes the match. The result is
-    /// `None` if the cost exceeds `bound`.
+    /// Returns the cost of the minimum cut between the known pixels and a match, and a flag for each pixel: whether it
+    /// takes the match. The result is `None` if the cost exceeds `bound`.
     pub(super) fn cut(
         &self,
         index: &Index,
@@ -208,7 +208,7 @@ impl Window {
         self.ends.iter().fold(0.0, |sum, pair| sum + cost(pair))
     }
 
-    /// Pastes the taken pixels and returns those that were holes.
+    /// Pastes the taken pixels, and returns the pixels that were unknown before.
     pub(super) fn paste(
         &self,
         canvas: &mut Canvas<'_>,

@@ -36,7 +36,7 @@ fn naive(image: &[f32], shape: [usize; 3], options: &Options) -> Vec<f32> {
             if count == 0.0 {
                 break;
             }
-            // Move to their mean position and colour.
+            // Move to the mean position and colour of these samples.
             let (mut stayed, mut distance) = (true, 0.0f32);
             for (axis, n) in [rows, columns].into_iter().enumerate() {
                 let by = (f64::from(moved[axis]) / f64::from(count)).round_ties_even() as isize;
@@ -118,7 +118,7 @@ fn refuses_what_it_cannot_filter() {
         wrap: [false; 2],
     };
     let monitor = Monitor::default();
-    // Invalid images, then invalid options, then a cancelled monitor are errors.
+    // Invalid images, invalid options and a cancelled monitor are errors.
     assert!(filter(&[0.0; 4], [2, 2, 2], &options, &monitor).is_err());
     assert!(filter(&[], [0, 2, 1], &options, &monitor).is_err());
     assert!(filter(&[f32::NAN; 4], [2, 2, 1], &options, &monitor).is_err());

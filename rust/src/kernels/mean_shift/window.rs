@@ -81,7 +81,7 @@ impl Planes {
     }
 }
 
-/// Sums over a window: offsets from its corner, and the number of samples.
+/// Sums over the selected samples of a window: offsets from its corner, and the number of samples.
 pub(super) struct Sums {
     pub(super) offset: [f32; 2],
     pub(super) count: f32,

@@ -232,9 +232,9 @@ impl Index {
 
     /// Returns the best matches by rising (cost, exemplar, row, column).
     ///
-    /// The choice is greedy: the best of all positions, then the best of those far enough from the
-    /// chosen ones, and so on. Fewer than `count` matches are returned if separation, ratio or
-    /// allowed positions leave no more.
+    /// The choice is greedy: first the best of all positions, then the best position that is far enough from the
+    /// chosen ones, and so on. Fewer than `count` matches are returned if separation, ratio and allowed positions
+    /// exclude all others.
     pub fn best(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
         check_pick(pick)?;
         let mut workspace = self.workspaces.take();
@@ -339,7 +339,7 @@ impl Index {
             );
             return Err(Error::value("patch", message));
         }
-        // Filter only the blocks of this exemplar, and convert their costs.
+        // Filter only the blocks of this exemplar, and convert their costs to the unit of exact costs.
         let mut workspace = self.workspaces.take();
         let first = self.blocks.partition_point(|b| b.exemplar < exemplar);
         let last = self.blocks.partition_point(|b| b.exemplar <= exemplar);

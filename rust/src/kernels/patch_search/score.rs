@@ -110,7 +110,7 @@ impl Prepared {
                 0.0
             });
         }
-        // Measure sum and norm of the kernel of each layer.
+        // Compute the sum and the norm of the kernel of each layer.
         self.row.resize(self.shape[1], 0.0);
         let mut row = std::mem::take(&mut self.row);
         self.kernels.clear();
@@ -152,7 +152,7 @@ impl Prepared {
         }
     }
 
-    /// Returns sum and norm of the kernel of a layer.
+    /// Returns the sum and the norm of the kernel of a layer.
     pub(super) fn kernel(&self, layer: usize) -> Kernel {
         self.kernels[layer]
     }

@@ -249,7 +249,7 @@ fn rectangle(
     if rows == 0 || layout.len == 0 {
         return flow.fill(0.0);
     }
-    // The pixels around the window are fixed.
+    // The pixels around the window are fixed, so their correction is 0.
     let (above, rest) = flow.split_at_mut(top * layout.width);
     let (inner, below) = rest.split_at_mut(rows * layout.width);
     above.fill(0.0);

@@ -39,7 +39,7 @@ pub(super) struct Base<'a> {
 }
 
 impl Base<'_> {
-    /// Adds the base row of row `r`.
+    /// Adds the base row that belongs to row `r`.
     pub(super) fn add_to(&self, row: &mut [f32], r: usize) {
         let base = self.layout.row(self.rows, self.first + 2 * r);
         row.iter_mut().zip(base).for_each(|(x, b)| *x += b);

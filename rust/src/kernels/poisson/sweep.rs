@@ -178,8 +178,8 @@ fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], line
                 own += ends[1][l];
             }
             own += shifts[l];
-            // Sherman-Morrison formula: the corner entries of a cyclic system are the product of
-            // two vectors.
+            // Apply the Sherman-Morrison formula: the corner entries of a cyclic system are the product of two
+            // vectors.
             out[l] = T::of(match (cyclic, row == 0, row + 1 == rows) {
                 (true, true, _) => 2.0 * own,
                 (true, _, true) => own + 1.0 / own,

@@ -118,7 +118,7 @@ wide_fn! {
 #[inline(always)]
 fn least<const WITNESS: bool>(out: &mut [f32], [a, b, c, d]: [[&[f32]; 2]; 4]) {
     for (i, out) in out.iter_mut().enumerate() {
-        // No closure over the four lines, because it would not be compiled for SIMD registers.
+        // Avoid a closure over the four lines, because it would not be compiled for SIMD registers.
         let (a, b) = (heavier::<WITNESS>(a, i), heavier::<WITNESS>(b, i));
         let (c, d) = (heavier::<WITNESS>(c, i), heavier::<WITNESS>(d, i));
         *out = lesser(lesser(a, b), lesser(c, d));

@@ -73,7 +73,7 @@ pub fn felzenszwalb(
         frame.len() + rows_in_work,
         PIXEL,
     )?;
-    // Measure the edges, and list and sort those that are not inactive.
+    // Measure the weights of the edges, and list and sort the edges that are not inactive.
     monitor.expect(STEPS);
     let mut weights = weights::measure(image, channels, &frame, options.blur, monitor)?;
     monitor.advance(STEPS / 4)?;
@@ -82,7 +82,7 @@ pub fn felzenszwalb(
     monitor.advance(STEPS / 8)?;
     let awake = sort(awake)?;
     monitor.advance(STEPS / 8)?;
-    // Join similar regions, then small ones.
+    // Join similar regions, then regions below the minimum area.
     let mut forest = Forest::new(&frame, options.scale)?;
     let left = forest.join_alike(&awake, &weights, monitor)?;
     monitor.advance(STEPS / 4)?;

@@ -44,7 +44,7 @@ pub(super) fn measure(
         let (mut here, mut below) = (vec![0.0; channels * stride], vec![0.0; channels * stride]);
         let first = block * ROWS;
         smoother.smooth(first, &mut scratch, &mut here);
-        // Measure the edges along this row, then those to the next row.
+        // Measure the edges along this row, then the edges to the next row.
         for (row, lines) in (first..).zip(lines.chunks_exact_mut(row_of_lines)) {
             let (along, rest) = lines.split_at_mut(stride);
             let sums = &mut scratch.flat[..columns];
@@ -97,7 +97,7 @@ fn make_taps(blur: f64) -> Vec<f64> {
         return vec![1.0];
     }
     let taps: Vec<f64> = (0..=reach).map(value).collect();
-    // Sum from one end to the other.
+    // Sum both sides, from one end of the Gaussian to the other.
     let sum: f64 = taps.iter().rev().chain(&taps[1..]).sum();
     taps.iter().map(|tap| tap / sum).collect()
 }

@@ -31,8 +31,7 @@ pub struct Energy<'a, const D: usize> {
 /// Labels of minimum energy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Labels {
-    /// Label of each point. Among several best labellings, this is the one with the fewest true
-    /// labels.
+    /// Label of each point. If several labellings have this energy, it is the labelling with the fewest true labels.
     pub labels: Vec<bool>,
     /// Sum of the costs of all points and pairs.
     pub energy: f64,

@@ -1,7 +1,7 @@
 //! A queue of nodes by distance, for searches that advance by bounded steps. It is Dial's queue (*Algorithm 360:
 //! shortest-path forest with topological ordering*, CACM 1969) with buckets that span more than one distance.
 
-/// Maximum number of buckets. More would cost memory without benefit.
+/// Maximum number of buckets. More buckets would cost memory without benefit.
 const MOST: u32 = 4096;
 
 /// A ring of buckets.

@@ -41,7 +41,7 @@ pub struct Pasted<'a> {
 
 /// Returns the least visible seam.
 ///
-/// Costs are rounded to multiples of 2^-16, or coarser if a straight seam costs more than 2^13.
+/// Costs are rounded to multiples of 2^-16, or to coarser multiples if a straight seam costs 2^13 or more.
 ///
 /// # Errors
 /// The sizes of the arrays do not match, or there are fewer than two pixels along `axis`. Values or penalties are not
@@ -91,7 +91,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
         1 => far,
         _ => transposed(&far, shape),
     };
-    // Sum the costs of the cut edges, skipping runs without any.
+    // Sum the costs of the cut edges, skipping runs without cut edges.
     let (mut value, mut edges) = (0.0, 0);
     let grid = grid(pasted)?;
     for (axis, costs) in costs.iter().enumerate() {
@@ -194,7 +194,7 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         0 => vec![0.0; n],
         _ => pair.differences(),
     };
-    // Test first without the position, so that the loop vectorises.
+    // Test all differences before looking for the position of a bad one, so that the loop vectorises.
     let far = |d: &f32| !(0.0..=FARTHEST).contains(d);
     if differences.iter().fold(false, |any, d| any | far(d)) {
         let at = differences.iter().position(far).unwrap_or(0);

@@ -26,7 +26,7 @@ pub(super) struct Block {
     pub(super) start: u32,
     /// End of the range, exclusive.
     pub(super) end: u32,
-    /// The block that follows after this one in the tree, or [`NONE`].
+    /// The parent block in the tree, which is eliminated later, or [`NONE`].
     pub(super) parent: u32,
 }
 

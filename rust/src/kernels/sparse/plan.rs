@@ -110,7 +110,7 @@ const MOST: usize = 8;
 /// The entries of a matrix, sorted by the columns of the factor.
 #[derive(Debug)]
 pub(super) struct Entries {
-    /// Start of the entries of each place in the order, and the end of the last ones.
+    /// Start of the entries of each place in the order, and the end of the last entries.
     pub(super) starts: Vec<u32>,
     /// Rows in the front of the block.
     pub(super) rows: Vec<u32>,
@@ -183,7 +183,7 @@ impl Plan {
         let mut whose: Vec<u32> = memory::filled(what, NONE, size)?;
         let mut fronts: Vec<Front> = Vec::with_capacity(count);
         let (mut rows, mut into): (Vec<u32>, Vec<u32>) = Default::default();
-        // Blocks whose parent has not come yet. The last ones are the children of the next block.
+        // Blocks whose parent has not been processed yet. The last of them are the children of the next block.
         let mut waiting: Vec<usize> = Vec::new();
         let mut len = 0;
         for (number, &Block { start, end, parent }) in order.blocks.iter().enumerate() {
@@ -192,7 +192,7 @@ impl Plan {
             let own = entries.of(start as usize..end as usize);
             let is_child = |&&child: &&usize| order.blocks[child].parent == number as u32;
             let children = waiting.len() - waiting.iter().rev().take_while(is_child).count();
-            // Collect the further rows: those of the children and of the matrix entries.
+            // Collect the further rows: the rows of the children and of the matrix entries.
             let most: usize = waiting[children..]
                 .iter()
                 .map(|&child| fronts[child].rows.len())
@@ -214,7 +214,7 @@ impl Plan {
             for &row in &entries.rows[own.clone()] {
                 gather(row, &mut rows);
             }
-            // The rows of each child are already sorted, which `sort` makes use of.
+            // The rows of each child are already sorted, which makes `sort` fast.
             rows[first..].sort();
             let columns = ((end - start) as usize).next_multiple_of(TILE) as u32;
             for (i, row) in (start..end).enumerate() {

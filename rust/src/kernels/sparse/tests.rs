@@ -3,7 +3,7 @@ use super::*;
 use crate::foundation::par;
 use proptest::prelude::*;
 
-/// A lower triangle.
+/// The lower triangle of a test matrix.
 #[derive(Debug, Clone)]
 struct Triangle {
     starts: Vec<u32>,
@@ -38,7 +38,7 @@ impl Triangle {
         made
     }
 
-    /// The Laplacian of the open cells of a grid. Each cell is coupled to the cells at `steps` from
+    /// Returns the Laplacian of the open cells of a grid. Each cell is coupled to the cells at the given `steps` from
     /// it.
     fn grid(rows: usize, columns: usize, steps: &[(usize, isize)], open: &[bool]) -> Self {
         let mut pairs = vec![];
@@ -115,7 +115,7 @@ impl Triangle {
     }
 }
 
-/// Couplings of the energy of a splice.
+/// Steps to the coupled cells in the energy of a splice.
 const WIDE: [(usize, isize); 6] = [(0, 1), (0, 2), (1, -1), (1, 0), (1, 1), (2, 0)];
 const NEAR: [(usize, isize); 2] = [(0, 1), (1, 0)];
 

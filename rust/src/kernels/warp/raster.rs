@@ -23,7 +23,7 @@ const FLAT: f64 = 1e-9;
 pub struct Mesh<'a> {
     /// Rows and columns of the source.
     pub shape: [usize; 2],
-    /// Target of each pixel.
+    /// Target position of each source pixel.
     pub target: &'a [Point],
     /// Weight of each vertex. If several triangles cover a pixel, the one with the largest total weight is visible.
     /// Triangles with a vertex of weight [`Mesh::VOID`] are not drawn.
@@ -35,7 +35,7 @@ impl Mesh<'_> {
     pub const VOID: u8 = 255;
 }
 
-/// Three corners: targets, sources and total weight.
+/// A triangle: target and source positions of its corners, and their total weight.
 #[derive(Clone, Copy)]
 pub(super) struct Triangle {
     pub target: [Point; 3],

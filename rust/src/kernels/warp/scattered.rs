@@ -7,7 +7,7 @@ use super::{Point, Warped};
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// Maximum absolute coordinate. Outputs are far smaller.
+/// Maximum absolute coordinate, far beyond the size of any output.
 const FAR: f64 = 1e7;
 
 struct Vertex {

@@ -49,8 +49,8 @@ pub(super) struct Vectors {
 /// fixed pixels than to its neighbours, so the factor is larger than 0.5. Measured on a disc of 0.8
 /// megapixels: 7 cycles with 0.7 and 0.8, 8 cycles with 0.6 and 1.
 const TIE: f32 = 0.75;
-/// Weights of the transfer. Four samples in a row are combined into one sample of the coarser level, and two coarser
-/// samples into one finer sample.
+/// Weights of the transfer between levels. Four samples in a row are combined into one sample of the coarser level,
+/// and two coarser samples into one finer sample.
 const TAPS: [f32; 2] = [0.25, 0.75];
 
 impl Level {
@@ -334,7 +334,7 @@ impl Level {
         [diagonal, 1.0 / diagonal]
     }
 
-    /// Applies the operator to one row.
+    /// Computes the result that `WHAT` selects for one row.
     fn row<const WHAT: u8>(&self, r: usize, x: &[f32], b: &[f32], step: f32, out: &mut [f32]) {
         let (n, start) = (out.len(), self.at(r, 0));
         let (x, b) = (self.lines(r, x), &b[start..][..n]);

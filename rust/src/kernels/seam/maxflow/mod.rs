@@ -14,9 +14,9 @@
 //!
 //! Departures from the paper:
 //!
-//! - The sweeps move most of the flow of a segmentation in a few passes over memory, which takes 67 % less time. Some
-//!   of the moved flow may not reach a demand. This is harmless, because a minimum cut does not require that this flow
-//!   returns to the source.
+//! - The sweeps move most of the flow of a segmentation in a few passes over memory. The cut then takes 67 % less
+//!   time. Some of the moved flow may not reach a demand. This is harmless, because a minimum cut does not require
+//!   that this flow returns to the source.
 //! - Children are found by looking at the neighbours instead of in lists, because a grid point has
 //!   few neighbours.
 //!
@@ -161,7 +161,7 @@ impl<const D: usize> Solver<D> {
     /// Returns the minimum cut of a graph.
     ///
     /// # Errors
-    /// The sizes of the arrays do not match the grid, there are more than 2^31 nodes, or the monitor was cancelled. A
+    /// The sizes of the arrays do not match the grid, there are 2^31 or more nodes, or the monitor was cancelled. A
     /// capacity is negative, or the two capacities of a pair sum to more than `i32::MAX`.
     pub fn min_cut(&mut self, graph: &Graph<'_, D>, monitor: &Monitor) -> Result<Cut> {
         let cut = self.min_cut_within(graph, i64::MAX, monitor)?;

@@ -199,7 +199,7 @@ impl<const D: usize> Solver<D> {
             node.distance = best + 1;
             return;
         }
-        // Set the node free, activate neighbours that can reach it, and orphan its children.
+        // Mark the node as free, activate neighbours that can reach it, and orphan its children.
         node.tree = Tree::Free;
         node.stamp = 0;
         for axis in 0..D {

@@ -101,7 +101,7 @@ impl Dual {
         Ok(true)
     }
 
-    /// Returns the pixels with residual capacity towards the core, over any number of edges.
+    /// Returns the pixels that have residual capacity to the core, directly or over several edges.
     fn residual(&self, value: i64, core: Vec<usize>) -> Vec<bool> {
         let (width, columns) = (self.width, self.width + 1);
         let mut taken = vec![false; self.rows * columns];

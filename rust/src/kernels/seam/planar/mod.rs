@@ -92,7 +92,7 @@ pub fn least_seam(strip: &Strip<'_>, monitor: &Monitor) -> Result<Seam> {
     let (value, crossings) = if !strip.cyclic {
         dual.open(monitor)?
     } else if strip.rows == 1 {
-        // The only face of a column is its own neighbour.
+        // With a single row, each face is its own neighbour, so the seam crosses only the cheapest edge of the row.
         let row = &strip.across[..strip.columns - 1];
         let j = (0..row.len()).min_by_key(|&j| row[j]).unwrap_or(0);
         (row[j], vec![j as u32])

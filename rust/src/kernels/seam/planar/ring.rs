@@ -1,6 +1,6 @@
 //! The cheapest seam around a core.
 //!
-//! The outside and the inside are each connected. The outside may be connected across the border of the grid. All
+//! The outside and the inside must each be connected. The outside may be connected across the border of the grid. All
 //! seams are then closed paths on an annulus of the dual. Like a cylinder, the annulus is cut open along a shortest
 //! path P from the outside to the inside.
 
@@ -44,9 +44,9 @@ const DEAREST: u32 = 1 << 28;
 /// offset down and to the right from the north-western pixel.
 const AROUND: [(usize, [usize; 2]); 4] = [(1, [1, 1]), (3, [1, 0]), (5, [0, 0]), (7, [0, 1])];
 
-/// Returns the pixels inside the cheapest seam, the innermost one if there are several. The result
-/// is `None` if this solver does not apply. Then the inside is missing or not connected, the
-/// outside has parts that do not meet the border, or costs are too large.
+/// Returns the pixels inside the cheapest seam, or inside the innermost of several cheapest seams. The result is
+/// `None` if this solver does not apply. Then the inside is missing or not connected, the outside has parts that do
+/// not meet the border, or costs are too large.
 ///
 /// # Errors
 /// The monitor was cancelled.
