@@ -61,7 +61,7 @@ class Filled:
     axes : int
         Number of axes without the channels: 2 or 3.
     stored : Stored
-        Number of chunks, and number of chunks computed in this call.
+        Report with the number of chunks, and the number of chunks computed in this call.
 
     """
 

@@ -15,7 +15,7 @@ from texrs.errors import InvalidInput
 __all__ = ["Box", "Grid", "as_sides"]
 
 MOST = 2**40
-"""Number of samples along an axis that an array must stay below."""
+"""Exclusive upper limit of the number of samples along an axis."""
 CHUNK = {2: 512, 3: 128}
 """Default side of a chunk in samples, by the number of axes."""
 

@@ -130,7 +130,7 @@ def _digest(function: Function, items: list[Item]) -> str:
 
 
 def _as_arrays(result: Any) -> dict[str, Array]:
-    """Return the arrays of a result by name: all maps of a material, or the image of another synthesis."""
+    """Return the arrays of a result by name: all maps of a material, the arrays of a mapping, or a single image."""
     material, image = getattr(result, "material", None), getattr(result, "image", None)
     if material is not None:
         return {name: np.asarray(each.pixels) for name, each in material.items()}

@@ -23,7 +23,7 @@ class Channel:
     dtype : numpy.dtype
         Dtype of the values.
     channels : tuple of int
-        Number of channels, or an empty tuple without a channel axis.
+        Number of channels as a tuple, or an empty tuple if the map has no channel axis.
     labelled : bool
         If True, the values are classes, which cannot be averaged.
 

@@ -31,7 +31,7 @@ RECORD = "texrs"
 BEGINNING = 0.5
 """Maximum number of seconds to wait until a folder becomes a store, because another process may be creating it."""
 IMAGE = "image"
-"""Name of a single map. It is stored at the root."""
+"""Name of the map if a store contains a single one, which is then stored at the root."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,8 @@ class Stored:
     path : str
         Path of the store or file.
     shape : tuple of int
-        Shape of the array, channels last. Without channels if there are several maps. For `texrs.stores.map_to_zarr`,
-        the arrangement of the items.
+        Shape of the array, channels last. If there are several maps, the channels are left out. For
+        `texrs.stores.map_to_zarr`, the shape of the grid of items.
     chunks : int
         Number of chunks of all maps and levels, or number of items.
     made : int

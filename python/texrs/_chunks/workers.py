@@ -31,7 +31,7 @@ Scheduler = Any
 Work = Callable[[int], Any]
 
 TRIES = 3
-"""Number of workers that a task may end before it is given up."""
+"""Number of workers that a task can end before the task is given up."""
 AHEAD = 2
 """Number of tasks queued at each worker, including the running task, so that a worker need not wait for the next."""
 SHORT = 1.0
@@ -42,7 +42,7 @@ Short tasks are batched because each task costs the scheduler and its worker som
 MOST_AT_ONCE = 32
 """Maximum number of tasks of a batch."""
 GRACE = 5.0
-"""Number of seconds in which a worker that must end can remove partial files."""
+"""Time that a worker has to remove partial files before its process is ended, in seconds."""
 
 
 class WorkerLost(TexrsError):
@@ -128,7 +128,7 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
 
 
 def _heed(stop: Any) -> None:
-    """End this process after a stop message, or after the death of the parent, which then cannot end it."""
+    """End this process after a stop message, or if the parent process has died and can no longer end it."""
     told = False
     with suppress(EOFError, OSError):
         stop.recv_bytes()
@@ -189,7 +189,7 @@ def _hold_interrupts() -> Iterator[None]:
 
 
 class _Process:
-    """A worker process and its queue of tasks, in order. It runs the first of them."""
+    """A worker process and its queue of tasks, whose first task is running."""
 
     def __init__(self, payload: bytes, count: int) -> None:
         # Spawn, because a forked process would inherit locks of threads that it does not have.

@@ -1,4 +1,4 @@
-"""Appearance vectors of an exemplar, and their use in synthesis: coherent blocks, and their correction."""
+"""Appearance vectors of an exemplar, synthesis of coherent blocks with them, and correction of the blocks."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class Appearance:
 
     @property
     def spacing(self) -> float:
-        """Median squared distance from a window to the nearest other one, in variances of all windows.
+        """Median squared distance from a window to the nearest other window, relative to the variance of all windows.
 
         It is the unit of the acceptance threshold.
         """
@@ -212,17 +212,18 @@ class Appearance:
         cell : int
             Side of a cell in points, 2 to 256. Default: 6.
         rounds : int
-            Number of half-rounds of choosing, 1 to 64. Cells of even and odd parity alternate.
+            Number of half-rounds, 1 to 64. Each half-round chooses the pieces of all cells of even or odd parity, in
+            turn.
         candidates : int
             Number of candidates of a cell in each half-round, 1 to 65535.
         contrast : float
-            Extent of dividing misfits by the contrast of the pieces, 0 (not divided) to 1 (fully divided). A value of
-            0 prefers pieces of low contrast, because they are near every piece on average.
+            Extent to which misfits are divided by the contrast of the pieces, 0 (not at all) to 1 (fully). A value of
+            0 prefers pieces of low contrast, because they are similar to every piece on average.
         continuation : float
             Cost of continuing exactly where a neighbour ends, 0 to 4, relative to the misfit of unrelated pieces. A
             value of 0 copies the exemplar in large pieces.
         repetition : float
-            Cost of using the same samples as a neighbouring cell, 0 to 4, in the same unit.
+            Cost of using the same samples as a neighbouring cell, 0 to 4, relative to the misfit of unrelated pieces.
         seed : int
             Seed of the random choices. Random numbers depend on positions in the output's coordinates, not on the
             region.

@@ -98,7 +98,7 @@ def move_shape(
     matrix : (2, 2) floats
         Linear part of the motion. It must have an inverse.
     canvas : (rows, columns)
-        Size of the canvas. The shape is on it before and after the motion.
+        Size of the canvas, which contains the shape before and after the motion.
     depth : float
         Minimum depth of pixels in the mask ``deep``, in pixels.
 

@@ -389,7 +389,7 @@ class Pasting:
 
 
 class Samples:
-    """Samples of one or several images as a list. Unwarped patches of them are inserted along minimum cuts.
+    """Samples of one or several images as a list. Unwarped patches of these samples can be cut into a window.
 
     Parameters
     ----------
@@ -406,7 +406,7 @@ class Samples:
         self.inner: Final = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
 
     def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
-        """Return the cost of a window's seams for each of several patches, if only this patch is cut in.
+        """Return the cost of the window's seams for each of several patches, if only that patch is cut in.
 
         Parameters
         ----------

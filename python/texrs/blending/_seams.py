@@ -24,8 +24,8 @@ WINDOW = np.round(BELL / (2 * BELL.sum() - 1), 15).tolist()
 OUTLINE = (0.35, 0.6)
 """Minimum shares of the step across a seam that are also present in one of its sources.
 
-Above the first share, the seam may be an outline of an element; above the second, it certainly is. Where noise is cut,
-the share is up to 0.25.
+Above the first share, the seam may be an outline of an element; above the second, it certainly is. For seams through
+noise, the share is at most 0.25.
 """
 
 

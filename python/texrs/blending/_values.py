@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.source_map._vectors import stores_z
 
 STRIP = 2**22
-"""Maximum number of pixels that are solved at once, or four times as many if corrections reach far."""
+"""Maximum number of pixels that are solved at once. If corrections reach far, four times as many are solved at once."""
 STEEPEST = 4.0
 """Maximum slope, 76 degrees. Steeper slopes are clipped."""
 FLATTEST = 0.2
@@ -101,7 +101,7 @@ class Samples:
 
 
 def _add_z(vector: Array) -> Array:
-    """Return vectors with z. A missing z follows from unit length."""
+    """Return vectors with z. If z is not stored, it follows from unit length."""
     if vector.shape[-1] > 2:
         return vector
     z = np.sqrt(np.maximum(1 - (vector * vector).sum(axis=-1, keepdims=True), 0))

@@ -26,7 +26,7 @@ __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 OF_VOLUMES = ("solid", "slice")
 """Commands whose inputs are volumes."""
 SHOWN = 8
-"""Maximum number of names that a notice lists. It only counts the others."""
+"""Maximum number of names that a notice lists. It gives only the number of further names."""
 FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
 """Pattern of the words in braces that are replaced, such as ``{name}``."""
 

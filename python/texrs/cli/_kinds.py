@@ -83,7 +83,8 @@ EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a m
 SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
 """Kind of an image that is aligned with the first one.
 
-If only one of them has an alpha channel, it is added or removed.
+If the first image has an alpha channel, this image gets an opaque one. If the first image has none, an opaque alpha
+channel of this image is removed.
 """
 UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
 """Kind of an image whose unknown pixels can have any values, such as NaN."""

@@ -160,12 +160,15 @@ def make_map(
 def read_kind(
     path: str, images: Sequence[Array], places: SourceMap, values: Mapping[tuple[str, ...], Any]
 ) -> tuple[Kind, Green]:
-    """Return how a map is interpreted: as the options specify, else according to its name."""
+    """Return the type of a map and its green direction: as the options specify, else as its name and values suggest."""
     return choose_kind(path, images, places.axes, values.get(("map_type",)), values.get(("green",)))
 
 
 def fit(finish: RenderOptions, paths: Sequence[str], given: Mapping[str, Any]) -> RenderOptions:
-    """Return the render options for a map. Light is only changed in colours, according to the name of the file."""
+    """Return the render options for a map.
+
+    Unless an option is given, light is kept in maps whose file names exclude colours.
+    """
     return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 
 

@@ -164,7 +164,7 @@ class Options:
         return values
 
     def call(self, values: Mapping[Path, Any]) -> dict[str, Any]:
-        """Return the arguments of the function for given values. Fields of a dataclass are combined to one argument."""
+        """Return the arguments of the function for given values. Fields of a dataclass become a single argument."""
         made = {path[0]: value for path, value in values.items() if len(path) == 1}
         for name, group in self.groups.items():
             fields = {path[1]: value for path, value in values.items() if len(path) == 2 and path[0] == name}
@@ -327,7 +327,7 @@ def _find_type(annotation: Any, default: Any) -> Any:
 
 
 def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
-    """Return the kind of a choice of words. If there is a ``default`` word, it stands for None."""
+    """Return the kind of a choice of words. If there is a ``default`` word, it represents None."""
     allowed = ["default", *words] if optional else list(words)
     chosen = make or {word: word for word in words}.__getitem__
 

@@ -266,7 +266,7 @@ def check_output(
     """Check that an image with the dtype and channels of ``like`` can be written. No file is left.
 
     Without ``like``, only check that a file can be created. An existing file must be from the same command, unless
-    ``--force`` is given. ``fills``: a transparent image can become opaque.
+    ``--force`` is given. If ``fills`` is True, a transparent image can become opaque.
     """
     with suppress(_Enough), write_output(path, option) as temporary:
         if like is None:
@@ -301,8 +301,8 @@ def write_output(
 ) -> Iterator[Path]:
     """Provide a temporary name for a file that becomes ``path`` at the end. Errors name ``path``.
 
-    The file contains the record of the command, or the record ``made``. ``inside``: the option names the folder of the
-    file. ``like``: colour description of the source image.
+    The file contains the record of the command, or the record ``made``. If ``inside`` is True, the option names the
+    folder of the file. ``like`` is the colour description of the source image.
     """
     if find_suffix(Path(path)).lower() == STORE:
         raise FileError(f"{path}: only texrs solid, synthesize, tiles and apply write Zarr stores")
@@ -374,7 +374,7 @@ PLACING = ("nrrd", "nii", "nii.gz")
 def find_volume(source: Any, axes: int) -> str | None:
     """Return the volume file whose spacing, orientation, origin and units are copied to the result.
 
-    None if there is none.
+    Return None if such a file does not exist.
     """
     there = axes == 3 and isinstance(source, str) and not source.startswith(SAMPLE)
     return source if there else None
@@ -397,7 +397,7 @@ def deliver(
     made: _provenance.Record | None = None,
     option: str = "out",
 ) -> None:
-    """Write a result and its additional outputs. ``like``: colour description for the file.
+    """Write a result and its additional outputs. ``like`` is the colour description for the file.
 
     Voxels keep the position of the file ``volume``, with another spacing if ``spacing`` is given.
     """

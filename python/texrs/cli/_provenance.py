@@ -1,9 +1,9 @@
 """Record how files were made: each output contains its command, which is checked before the file is replaced.
 
 The record contains everything that the result depends on. This is the version, the command, its arguments, the options
-that are not the default, the seed, and the SHA-256 of every input file. File names are relative to the folder of the
-output, so that a folder can be moved as a whole. Options without an effect on the result (threads, progress, names of
-outputs) and dates are omitted. The same command therefore gives the same bytes.
+that differ from their defaults, the seed, and the SHA-256 of every input file. File names are relative to the folder
+of the output, so that a folder can be moved as a whole. Options without an effect on the result (threads, progress,
+names of outputs) and dates are omitted. The same command therefore gives the same bytes.
 """
 
 from __future__ import annotations
@@ -75,9 +75,9 @@ class Record:
     stacks: tuple[str, ...] = ()
     """Folders of maps whose files are all inputs."""
     placed: bool = False
-    """Whether the arguments contain places, so that the record states the order of their coordinates."""
+    """If True, the arguments contain places, so the record states the order of their coordinates."""
     force: bool = False
-    """Whether any existing file can be replaced."""
+    """If True, any existing file can be replaced."""
     original: Mapping[str, str] = field(default_factory=dict)
     """Recorded names of files that are read from other paths, if a result is made again."""
     checked: set[str] = field(default_factory=set)
@@ -116,7 +116,7 @@ class Record:
     def tell(self, target: str, *, output: str = "out", inside: bool = False, suffix: str = "") -> str:
         """Return the record for an output file as JSON.
 
-        It also states which option named the file, and whether the option named its folder.
+        The record also states which option named the file, and whether the option named its folder.
         """
         folder = os.path.dirname(os.path.realpath(target))
         said: dict[str, Any] = {
@@ -160,7 +160,7 @@ def as_flag(name: str) -> str:
 
 
 def read_status(path: str) -> os.stat_result | None:
-    """Return the status of a regular file or Zarr store. None if there is none at the path."""
+    """Return the status of a regular file or Zarr store, or None if the path is neither."""
     with suppress(OSError, ValueError):
         status = os.stat(path)
         if stat.S_ISREG(status.st_mode) or io.is_store(path):
@@ -169,7 +169,7 @@ def read_status(path: str) -> os.stat_result | None:
 
 
 def expand_braces(text: str) -> list[str]:
-    """Return the files that a text such as ``in/rock_{albedo,normal}.png`` names. Empty for other texts."""
+    """Return the files that a text such as ``in/rock_{albedo,normal}.png`` names. Other texts give an empty list."""
     found = BRACES.fullmatch(text)
     if not found or os.path.lexists(text):
         return []
@@ -177,7 +177,7 @@ def expand_braces(text: str) -> list[str]:
 
 
 def list_folder(name: str) -> list[str]:
-    """Return the files in a folder, or those that a text with braces names. Empty for other texts."""
+    """Return the files in a folder, or the files that a text with braces names. Other texts give an empty list."""
     if not name or "\0" in name or io.is_store(name):
         return []
     if not os.path.isdir(name):
@@ -258,7 +258,10 @@ def narrow(
     seed: int | None = None,
     files: Sequence[str] | None = None,
 ) -> Record | None:
-    """Return the record of the running command with other arguments, and with changed options (None: removed)."""
+    """Return the record of the running command with other arguments and options.
+
+    Options with the value None are removed.
+    """
     whole = RUNNING.get()
     if whole is None:
         return None

@@ -45,7 +45,7 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
 
 
 def match_alpha(image: Any, like: Array | None) -> Any:
-    """Add an opaque alpha channel to an image, or remove its alpha channel, so that it matches another image."""
+    """Add an opaque alpha channel to an image, or remove an opaque one, so that the image matches another image."""
     if not isinstance(image, np.ndarray):
         return image
     colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]

@@ -59,11 +59,11 @@ class Recipe:
     """Name of the file within the output folder, if the output is a folder."""
     suffix: str
     rows_first: bool
-    """Whether places in the record are row,column, because it does not state x,y."""
+    """If True, places in the record are row,column. Records that do not state x,y are read in this way."""
 
     @classmethod
     def read(cls, path: str) -> Recipe | None:
-        """Read the record in a file. None if there is none."""
+        """Read the record in a file, or return None if there is none."""
         text = io.read_metadata(path).made
         if text is None:
             return None

@@ -129,7 +129,7 @@ def scale_map_command(
 
 
 def find_fov(image: str) -> dict[str, float]:
-    """Return the angle of view in a photograph's metadata, as an argument of the function. Empty without metadata."""
+    """Return the angle of view from a photograph's metadata as an argument, or no argument if it is not stated."""
     fov = None if image.startswith(_outputs.SAMPLE) else io.read_fov(image)
     return {} if fov is None else {"fov": fov}
 

@@ -157,7 +157,7 @@ class Stack:
             )
 
     def save(self, material: Material, folder: Path, *, mipmaps: bool = False) -> list[Path]:
-        """Write the maps to a folder. If ``mipmaps``, also write them at half sizes."""
+        """Write the maps to a folder. If ``mipmaps`` is True, also write them at half, quarter and smaller sizes."""
         depth: Any = self.depth
         pack: Any = self.pack
         how = {"pack": pack, "convention": self.convention, "mipmaps": mipmaps}

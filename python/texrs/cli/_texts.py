@@ -115,7 +115,7 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
 
 
 def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
-    """Convert texts to one number for each plane. The word found becomes None."""
+    """Convert texts to one number for each plane. The word "found" becomes None."""
     found: list[float | None] = []
     for text in texts:
         word = text.strip().lower()

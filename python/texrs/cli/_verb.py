@@ -62,7 +62,7 @@ class Verb:
     says: Callable[[Synthesis], str] = lambda result: ""
     """Function that returns additional text about a result."""
     scaled: bool = True
-    """Whether a pixel of the result shows the same length as a pixel of the first input."""
+    """If True, a pixel of the result shows the same length as a pixel of the first input."""
     fills: bool = False
     """If True, the command fills pixels of the first input and keeps the others in place.
 
@@ -76,7 +76,7 @@ class Verb:
     beyond: str = ""
     """Remedy in errors about results that are too large."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
-    """Function that returns values for options that are not given, from the texts of the others."""
+    """Function that returns values for options that are not given, from the texts of the given options."""
 
     def make_command(self) -> Callable[..., None]:
         """Return the function of the command for typer."""
@@ -194,7 +194,7 @@ class Verb:
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
     def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
-        """Return the material among the inputs whose maps the result has. None if there is none.
+        """Return the material among the inputs whose maps the result also has, or None.
 
         Inputs that only guide the result are ignored.
         """

@@ -75,7 +75,7 @@ def compare(
     timed: bool = True,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Let all installed methods do the tasks for some images.
+    """Run all installed methods on some images, and measure their results.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def take_middle(image: Array, side: int, name: str) -> Array:
 
 
 def make_hole(shape: tuple[int, ...]) -> Bools:
-    """Mark a square in the middle."""
+    """Return the mask of a square hole in the middle of an image."""
     hole = np.zeros(shape, bool)
     rows, columns = (slice(int(n * (1 - HOLE) / 2), int(n * (1 + HOLE) / 2)) for n in shape)
     hole[rows, columns] = True

@@ -46,7 +46,7 @@ def measure_colours(example: Array, made: Array, where: Bools | None = None) -> 
 
 
 def measure_detail(example: Array, made: Array, where: Bools | None = None) -> float:
-    """Return the error of contrast in octaves, the mean over sizes of detail."""
+    """Return the mean error of the contrast over all sizes of detail, in octaves."""
     wanted, shown = list_bands(example), list_bands(made)
     gaps = []
     for i in range(OCTAVES):

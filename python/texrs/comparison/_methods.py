@@ -1,4 +1,4 @@
-"""The compared methods: of texrs, of other programs that are installed, and trivial ones.
+"""The compared methods: methods of texrs, methods of other installed programs, and trivial methods.
 
 Other programs are called as their documentation shows, with their own defaults. They run with one thread if only this
 makes the result repeatable. None of them is part of texrs or linked to it.

@@ -135,7 +135,7 @@ def show_pictures(pictures: Mapping[str, Array], holes: Mapping[str, Bools], res
 
 
 def show(image: Array, name: str, method: str, figures: str, *, four: bool = False) -> str:
-    """Return an image and its measures. If ``four``, repeat it two by two to show its borders."""
+    """Return an image and its measures. If ``four`` is True, show 2 x 2 copies, so that the borders are visible."""
     height, width = image.shape[:2]
     alt = f"{name}: {method}{', two by two' if four else ''}"
     if four:
@@ -152,7 +152,7 @@ def caption(method: str, figures: str = "") -> str:
 
 
 def table(rows: str) -> str:
-    """Return a table that scrolls sideways if it is too wide, also by keys."""
+    """Return a table that scrolls sideways if it is too wide, also with the keyboard."""
     return f'<div class="wide" tabindex="0"><table>{rows}</table></div>'
 
 

@@ -6,7 +6,7 @@ corners of a cell select one of 81 tiles. Neighbouring tiles therefore agree alo
 and the texture is not periodic. A window takes only the time of a copy, at any position.
 
 First, several tileable images are designed (`texrs.design_variants`). Then a strip for each pair of corners is cut
-from them. Finally the inside of each tile is cut into its ring of strips, once along all edges
+from them. Finally the inside of each tile is cut into its ring of strips by one cut along all four edges
 (`texrs.corner_tiles._cutting`). Candidates are the positions that are most similar to the known part
 (`texrs.corner_tiles._fitting`). The candidate with the least visible cut is used; cuts through elements cost more. If
 the exemplar repeats on a lattice, tiles contain whole periods, and all their pieces are aligned with the lattice. The

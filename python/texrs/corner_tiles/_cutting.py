@@ -38,8 +38,8 @@ def cut_tiles(
 
     1. Corners: choose a window of an image for each colour.
     2. Edges: for each pair of corners, across and down, cut a window into both corners. The result is a strip.
-    3. Tiles: the ring of a tile is the inner half of its four strips. Cut an inside into the ring, once along all
-       edges.
+    3. Tiles: the ring of a tile is the inner half of its four strips. Cut an inside into the ring by one cut along all
+       four edges.
     """
     half = round(BORDER * side)
     draw = Draw(np.random.default_rng(np.random.PCG64(seed)), len(pictures.images), pictures.size, step)
@@ -65,10 +65,10 @@ def cut_tiles(
 
 
 def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, corners: tuple[Place, Place]) -> Places:
-    """Cut the strip between two corners, ``side`` long and 2 ``half`` wide. The strip of axis 1 runs across."""
+    """Cut the strip between two corners, ``side`` long and 2 ``half`` wide. The strip of axis 1 is horizontal."""
 
     def look(place: Place, along: int, length: int) -> Places:
-        """Return the part of a strip that begins ``along`` pixels from a corner's centre, laid out across."""
+        """Return the part of a strip that begins ``along`` pixels from a corner's centre, turned to be horizontal."""
         which, row, column = place
         if axis:
             return pictures.at((which, row - half, column + along), (2 * half, length))

@@ -266,7 +266,7 @@ def _to_plain(value: Any) -> Any:
 
 
 def restore_option(value: Any) -> Any:
-    """Return an option that `_to_plain` converted in its original form."""
+    """Return an option in the form that it had before `_to_plain`."""
     if isinstance(value, dict) and "shape" not in value:
         return ElementSearch(**value)
     if isinstance(value, dict):

@@ -126,7 +126,7 @@ class TextureDatabase:
         return isinstance(name, str) and name in self._folder.read()
 
     def __getitem__(self, name: str) -> ElementAnalysis:
-        """Return the analysis of a texture. It is repeated if the entry is outdated or damaged."""
+        """Return the analysis of a texture. An outdated or damaged analysis is computed again."""
         return self.analyse(name)
 
     def list(self) -> list[Record]:
@@ -282,7 +282,7 @@ class TextureDatabase:
     def analyse(self, name: str, *, progress: Progress | bool | None = None) -> ElementAnalysis:
         """Return the analysis of a texture.
 
-        It is repeated if its image or version has changed, or the entry is damaged.
+        The analysis is computed again if its image or version has changed, or if the entry is damaged.
 
         Parameters
         ----------
@@ -423,7 +423,7 @@ class TextureDatabase:
         Returns
         -------
         Matrix
-            Splices, their contact sheet, and the reasons for missing ones, which are grey on the sheet.
+            Splices, their contact sheet, and the reasons for missing splices, whose cells on the sheet are grey.
 
         Raises
         ------

@@ -48,7 +48,7 @@ def _inpaint(workshop: Workshop) -> str:
 
 
 def mark_scratches(shape: tuple[int, int]) -> Bools:
-    """Mark a spot and a scratch."""
+    """Return the mask of a spot and a scratch."""
     row_, column = (i / n for i, n in zip(np.indices(shape), shape, strict=True))
     spot = ((row_ - 0.42) / 0.17) ** 2 + ((column - 0.5) / 0.22) ** 2 < 1
     holes: Bools = spot | (np.abs(row_ - 0.85 + 0.15 * column) < 0.02)

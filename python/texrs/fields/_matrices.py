@@ -16,12 +16,15 @@ Numbers = NDArray[np.float64]
 Matrices = NDArray[np.float64]
 
 POLAR_STEPS = 5
-"""Newton iterations (Higham scaling) of the polar decomposition.
+"""Number of Newton iterations (with Higham's scaling) of the polar decomposition.
 
 They bring a matrix of condition number 100 within 1e-11 of the limit.
 """
 _TERMS, _SQUARINGS = 9, 4
-"""Terms of the Taylor series and number of squarings, exact to 1e-10 for matrices of norms up to 5."""
+"""Number of terms of the Taylor series, and number of squarings.
+
+The results are exact to 1e-10 for matrices of norms up to 5.
+"""
 
 
 def repeat(matrix: NDArray[np.float64], count: int) -> Matrices:
@@ -91,7 +94,7 @@ def norms(m: Matrices) -> Numbers:
 
 
 def rotations(m: Matrices) -> Matrices:
-    """Return the nearest orthogonal matrices (the polar factors), not finite if there are none."""
+    """Return the nearest orthogonal matrices (the polar factors). Values are not finite for singular matrices."""
     x = m
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for _ in range(POLAR_STEPS):

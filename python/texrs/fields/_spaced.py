@@ -57,7 +57,7 @@ class Spaced(Field):
 def space(field: Field, spacing: Sequence[float] | None) -> Field:
     """Return a field for voxels with the given distances.
 
-    It is unchanged if they are 1, or if it already has a spacing.
+    The field is returned unchanged if all distances are 1, or if it already has a spacing.
     """
     if isinstance(field, Spaced):
         return field
@@ -70,7 +70,7 @@ def find_distances(spacing: Sequence[float] | None, value: object, axes: int) ->
     """Return the given distances between voxels, or else the distances in the file of a volume, and report these.
 
     The volume is a path, an array that `texrs.io.read_volume` returned, or an exemplar of one of them. The result is
-    None if neither states distances.
+    None if distances are neither given nor stated in the file.
     """
     if spacing is not None or axes != 3:
         return spacing

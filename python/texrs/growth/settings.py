@@ -29,9 +29,9 @@ class Settings:
         Settings of the blocks of the start: side of a cell in points, number of half-rounds of choosing, and number of
         candidates per choice.
     contrast, continuation, repetition : float
-        Settings of the blocks of the start. ``contrast``: extent of dividing a misfit by the contrast of the block,
-        from 0 to 1. ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost of using
-        the same samples as a neighbour.
+        Settings of the blocks of the start. ``contrast``: extent to which misfits are divided by the contrast of the
+        block, from 0 to 1. ``continuation``: cost of continuing exactly where a neighbour ends. ``repetition``: cost
+        of using the same samples as a neighbour.
     acceptance : float
         Acceptance threshold: the minimum improvement for which a random match replaces the present one.
     coherence : float

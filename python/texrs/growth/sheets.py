@@ -26,7 +26,7 @@ OVERLAP = 0.33
 CANDIDATES = 4
 """Number of source positions that are tried for each patch. The best one is used."""
 COLOUR, SURPRISE = 0.4, 0.5
-"""Weights of seams. Colours have more weight than for textures of one scale: edges of equal size rarely meet."""
+"""Weights of seams. Colours have more weight than for a single scale, because edges of equal size rarely meet."""
 UNIT = 512
 """Weight of a scale error, in 1/256 of a squared unit of log scale.
 

@@ -165,7 +165,7 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
 def part_at_borders(entry: ElementAnalysis) -> NDArray[np.integer[Any]]:
     """Return the labels of analysed elements, where elements that cross a periodic border are split.
 
-    Elements move within the exemplar only.
+    This is necessary because elements can only move within the exemplar.
     """
     from scipy.ndimage import label
 

@@ -58,9 +58,9 @@ class Canvas(Draft):
     """A draft in progress, with the pixels that its elements occupy."""
 
     hard: Bools
-    """Hard constraints of later cuts: pixels deep inside of placed elements."""
+    """Hard constraints of later cuts: pixels deep inside placed elements."""
     occupied: Labels
-    """Label of the element that occupies each pixel, or 0. Other elements must not cover it."""
+    """Label of the element that occupies each pixel, or 0. Other elements must not cover an occupied pixel."""
 
     @classmethod
     def start(cls, picture: Floats, mirror: Flip, covered: Bools, hard: Bools, occupied: Labels) -> Canvas:

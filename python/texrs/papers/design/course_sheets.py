@@ -98,7 +98,7 @@ def lay_sheets(
 
 
 def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int) -> NDArray[np.intp]:
-    """Return course numbers that fill a size: in the exemplar's order, and after its end from a random course on."""
+    """Return the numbers of courses that fill a size: in the exemplar's order, then from a random course on."""
     found: list[tuple[float, list[int]]] = []
     for attempt in range(TRIES if wrap else 1):
         # A texture that does not wrap can begin within its first course, so it needs one more course.
@@ -130,7 +130,7 @@ def exchange_courses(
 
 
 def measure_stones(courses: Courses, level: Floats, reach: float) -> Floats:
-    """Return how deep each pixel of a levelled exemplar is inside a stone: 0 at joints, 1 from ``reach`` pixels on.
+    """Return the depth of each pixel of a levelled exemplar inside a stone: 0 at joints, 1 from ``reach`` pixels on.
 
     Joints within a course are detected by the mean colour of the joints between courses.
     """

@@ -108,7 +108,7 @@ def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: 
 
 
 def reach_beyond(rows: slice, columns: slice, pad: int) -> Floats:
-    """Return inner distances of an element that covers the image and has no outline: distances to its box's corner."""
+    """Return inner distances of an element that covers the image and has no outline: distances to a box corner."""
     shape = (rows.stop - rows.start + 2 * pad, columns.stop - columns.start + 2 * pad)
     row, column = np.indices(shape)
     distance: Floats = np.sqrt((row + 1) ** 2 + column**2).astype(np.float32)

@@ -53,7 +53,7 @@ class Heap:
         return cls(elements, labels, np.array(rows, np.float64).reshape(-1, 4))
 
     def rank_takers(self, site: int, moves: Moves) -> list[tuple[Element, float, float, bool]]:
-        """Return (element, rotation in degrees, scale, whether any rotation fits) for the best fits of a place."""
+        """Return (element, rotation in degrees, scale, whether any rotation fits) for the elements that fit best."""
         side, long, angle, whole = self.measures.T
         angle = (angle[site] - angle + 90) % 180 - 90
         directed = np.minimum(long, long[site]) >= math.log(LONG)
@@ -95,7 +95,7 @@ class Heap:
         return None
 
     def fills(self, placement: Placement, element: Element) -> bool:
-        """Return whether the placed element covers the element's place and has nearly the same shape."""
+        """Return whether the placed element covers the place of the replaced element and has nearly the same shape."""
         shape, there = placement.distance > 0, self.labels[placement.window] == element.label
         both = np.count_nonzero(shape & there)
         return bool(both >= ALIKE * (np.count_nonzero(shape) + element.area - both))

@@ -23,7 +23,7 @@ from texrs.source_map import SourceMap
 __all__ = ["Layer", "mix"]
 
 OUTLINE, DEEP = 0.03, 6.0
-"""Cost of a border along the outline of an element that stays whole, and cost added in the middle of an element.
+"""Cost of a border along the outline of an element that is not cut, and cost added in the middle of an element.
 
 A border on plain background costs 1.
 """

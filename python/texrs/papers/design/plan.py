@@ -82,8 +82,8 @@ def make_plan(
 def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
     """Return the permitted mirror images: as requested, or by default all that look like the exemplar."""
     if options.allow_mirror is None:
-        # If rotation is forbidden, do not mirror by default: the example can have an upper side, light from one side
-        # or letters, which the statistics can miss.
+        # If rotation is forbidden, do not mirror by default: the example can have an upper side, light from one side,
+        # or letters. The statistics can miss these.
         return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 

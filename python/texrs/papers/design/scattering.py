@@ -3,8 +3,8 @@
 This is a departure from Figure 7 of the paper, which distributes whole exemplars. Here each element is cut out without
 its surroundings, and is turned, mirrored and scaled like a moving element of its exemplar. The elements of one
 exemplar form a layer, and layers of later exemplars are above earlier ones. The top layer is placed first, and each
-new element is placed below all existing ones, so that it never covers them. Elements of one layer do not touch. Only
-if they form a heap in their exemplar can they overlap, when free places run out.
+new element is placed below all existing ones, so that it never covers them. Elements of one layer do not touch. They
+can only overlap if they form a heap in their exemplar and free places run out.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["find_scattered_elements", "scatter"]
 SMALL, LARGE = 0.3, 4.0
 """Smallest and largest area of a scattered element, relative to the median.
 
-Smaller ones are splinters, larger ones are clumps of elements that were not separated.
+Smaller elements are splinters, and larger ones are clumps of elements that were not separated.
 """
 EDGE = 0.75
 """Depth in pixels beyond which a pixel belongs only to the element.

@@ -36,7 +36,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     which : int
         Number of the draft's exemplar.
     seed : int
-        Number that selects patches where all surroundings are open.
+        Seed that selects patches for places whose surroundings are all open.
 
     Returns
     -------

@@ -29,8 +29,8 @@ Departures from the paper, with their reasons:
   then used for the costs of cuts, but are not repaired. This reduces the length of seams inside elements to a quarter.
 - More patches, half as many as in the first round, are tried at the most visible seams. They need not fit the existing
   patches, and are used if the seams become less visible.
-- Source positions that were used often have a cost, and so have overrepresented classes of colour. Without it rare
-  elements disappear, because cuts are cheapest without them.
+- Source positions that were used often have a cost, and so have overrepresented classes of colour. Without these
+  costs, rare elements disappear, because cuts are cheapest without them.
 
 Departures from the paper in the corrections (``quality="fast"``):
 

@@ -267,8 +267,8 @@ class Layers:
 def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
     """Return the side of the boxes in voxels: the side of a patch, scaled by the field.
 
-    The scale is the 90 % quantile at places around the origin. Boxes are divided if the field is smaller at their
-    place. Boxes that are generally too small would tear elements.
+    The scale is the 90 % quantile at places around the origin. Boxes are divided if the scale at their place is
+    smaller. Boxes that are generally too small would tear elements.
     """
     side, axes = LARGER * patch_side(exemplar.shape), exemplar.axes
     if field is not None:

@@ -12,8 +12,8 @@ Section 3 of Su, Chang, Shih and Tai, with its misprints corrected:
 The paper leaves other details open, which are filled in as follows. The appearance space is the space of the level
 (C^l and A_l have a level, V' does not). The coarsest level of the pyramid has 16 samples along each axis, so coarser
 levels of the output are only upsampled and jittered. Warped neighbours are rounded to the lattice. The paper omits a
-border of the exemplar. A coordinate that leaves the rest returns on the other side, and a candidate that leaves it is
-not used. There are two passes of 2^D classes of points, one for each parity.
+border of the exemplar. A coordinate that leaves the remaining part returns on its other side, and a candidate outside
+this part is not used. There are two passes of 2^D classes of points, one for each parity.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def grow_as_printed(
         first, coarsest = first - 1, coarsest.parents()
     zero = np.zeros(coarsest.points * len(region.shape), np.int32)
     start = Start(first, lambda region, frames, asked, progress: (zero, None))
-    # A_l, the Jacobians of level l, is the field at the positions of the level's points.
+    # A_l contains the inverse frames of the field at the positions of the level's points.
     frames = partial(to_fixed, field)
     correction = Correction(exemplar, seed, first, compensated)
     return grow(region, levels, start, correction, frames, show=show, progress=progress)
@@ -142,7 +142,7 @@ class Correction:
 
 
 def bring_inside(places: Places, exemplar: Appearance, above: int) -> Places:
-    """Wrap coordinates that leave the exemplar. They belong to a level that is ``above`` levels coarser."""
+    """Wrap the coordinates of an output level, ``above`` levels coarser than an exemplar's level, into the exemplar."""
     axes = len(exemplar.shape)
     out = places.reshape(-1, axes)
     for axis, (n, closed) in enumerate(zip(exemplar.shape, exemplar.wrap, strict=True)):

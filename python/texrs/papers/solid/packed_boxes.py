@@ -75,7 +75,8 @@ class Box:
         axes = patches.ndim
         centre, place = self.table[:, :axes], self.table[:, axes : 2 * axes]
         frame = self.table[:, 2 * axes : -2].reshape(-1, axes, axes)
-        # Look up the part of S(p) = place + J (p - centre) that is constant within a patch, and add J p axis by axis.
+        # Compute S(p) = place + J (p - centre). Look up the part that is constant within a patch, and add J p axis by
+        # axis.
         out: Places = (place - np.einsum("kij,kj->ki", frame, centre)).astype(np.int32)[patches]
         for axis in range(axes):
             line = np.arange(there[axis].start, there[axis].stop, dtype=np.int32)

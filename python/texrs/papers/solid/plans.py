@@ -96,7 +96,7 @@ def choose_plan(
         or the size of the result, so that all textures of an exemplar use the same method.
 
     """
-    # Do not try plans with labels, because labels have no colours by which results could be compared.
+    # Do not try plans for labels, because labels have no colours to compare.
     if patches != "auto" or exemplar.labels:
         return ("default" if patches == "auto" else patches), None
     stitcher = exemplar.stitcher

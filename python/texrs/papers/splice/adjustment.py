@@ -34,7 +34,7 @@ Nets are more flexible than walls.
 def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool = False) -> Match:
     """Push disjoint elements apart; for connected figures, limit their strain, and straighten rows if ``snap`` is True.
 
-    If ``part`` is True, disjoint elements that touch in the texture may still touch. It is used for a strength below
+    If ``part`` is True, disjoint elements that touch in the texture may still touch. This is used for a strength below
     1, and for elements in their own layout.
     """
     if a.layout == Layout.DISJOINT:

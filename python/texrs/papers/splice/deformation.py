@@ -21,7 +21,7 @@ from texrs.papers.splice.texture_extension import Extension
 __all__ = ["Deformation", "deform", "deform_by_energy", "find_rigid_shifts", "mark_removed"]
 
 SHRINKAGE = 0.9
-"""Share of the way to the middle of their element that erased pixels move."""
+"""Share of the distance to the middle of their element that erased pixels move."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

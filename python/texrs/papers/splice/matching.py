@@ -55,7 +55,7 @@ OFFSETS, NEARER = 6, 0.9
 """Number of tried offsets of a connected figure's layout along each axis. Maximum relative cost of a preferred offset.
 """
 ALONE = 0.5
-"""Minimum distance from an empty place to all elements, in spacings. Otherwise no element is moved to the place."""
+"""Minimum distance from an empty place to all elements, in spacings, for which an element is moved to the place."""
 CLEARANCE = 1.08
 """Minimum distance between the centres of elements, as a multiple of their diameter."""
 

@@ -35,8 +35,7 @@ DRAWN, LARGE = (6.0, 12.0), 640.0
 DISC = 0.45
 """Radius of a disc, in spacings."""
 PATCH, SMALLEST, OVERLAP = 3.5, 1.0, 0.36
-"""Side of a patch in spacings (at most half an image), minimum side in spacings, and overlap as a share of the side.
-"""
+"""Side of a patch in spacings (at most half an image), minimum side in spacings, and overlap as a share of the side."""
 CLOSE = (0.7, 1.04)
 """Minimum and maximum of the least distance between elements, as a share of the sum of their radii."""
 ROUGH, TIGHT, ROUNDS = 0.7, 0.92, 12
@@ -210,7 +209,7 @@ def _measure_closest(points: Points, radius: Reals) -> float:
 
 
 def _push_apart(found: Sown, points: Points, radius: Reals, closest: float) -> Sown:
-    """Push sown elements apart if they are closer than elements of the image, and remove those without room."""
+    """Push sown elements apart if they are closer than elements of the image, and remove elements without room."""
     from scipy.spatial import cKDTree
 
     at, own = found.points.copy(), len(points)

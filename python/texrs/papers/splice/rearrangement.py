@@ -139,7 +139,7 @@ def move_picture(a: ElementAnalysis, step: NDArray[np.intp]) -> tuple[Places, Bo
 
 
 def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bool, bool]) -> Bools:
-    """Return True for foreground without an element that stays when the image is shifted."""
+    """Return True for foreground outside elements that is kept when the image is shifted."""
     from scipy.ndimage import label
 
     pieces, count = label(own < 0)

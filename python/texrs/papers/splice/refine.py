@@ -41,7 +41,7 @@ WIDE = 1.0
 Narrower holes are filled by continuing the pixels at their boundary.
 """
 PATCH, LEAST = 0.33, 6
-"""Side of these patches as a share of the spacing, and minimum side in pixels.
+"""Side of the patches that fill wide holes, as a share of the spacing, and minimum side in pixels.
 
 Smaller patches have no reliable roughness.
 """
@@ -52,7 +52,7 @@ The second number is the minimum roughness of a patch, relative to the backgroun
 gradient of a patch, edges included, relative to the background.
 """
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
-"""Number of patches as rough as the background that is enough to leave out all others.
+"""Minimum number of patches as rough as the background for which other patches are not used.
 
 The second number is the minimum number of patches of any roughness. The third is the number of patches that are tried
 at most, because all patches of a plain background fit.

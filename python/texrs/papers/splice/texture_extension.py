@@ -1,4 +1,4 @@
-"""Extend the texture whose elements are used beyond its borders.
+"""Extend a texture beyond its borders, so that more elements of it can be used.
 
 A splice needs elements from outside the image, because the new layout can be denser and the image's own border moves
 into the output. The image repeats if it wraps, and is reflected otherwise. Disjoint elements of reflected copies are

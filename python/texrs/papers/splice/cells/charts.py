@@ -36,7 +36,7 @@ target are smoothed equally, so that corners stay at corners.
 SLIDES, SLIDE = 4, 0.9
 """Number of steps of the slide of source points, and share of the remaining distance that each step covers."""
 CORE, EDGE, STEEP = 0.8, 1.5, 0.4
-"""Minimum depth of source points: maximum share of the source's greatest depth, limit in pixels, and slope.
+"""Parameters of the minimum depth of source points: share of the source's greatest depth, limit in pixels, and slope.
 
 The limit is added to half the width of a joint. A source point is at least as deep as its pixel in the target, up to
 this limit. Beyond it, the minimum grows by the slope per pixel, up to the share of the greatest depth.

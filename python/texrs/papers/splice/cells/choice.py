@@ -18,12 +18,15 @@ __all__ = ["TURNS", "Shortlist", "shortlist"]
 RAYS = 72
 """Number of rays of the radial profiles that describe shapes: one ray every five degrees."""
 TURNS = (0, 30, -30, 60, -60, 90, 180)
-"""Tried rotations of a cell in degrees, multiples of the angle between rays; only 0 if cells may not be rotated."""
+"""Rotations of a cell that are tried, in degrees: multiples of the angle between rays.
+
+Cells that may not be rotated only use 0.
+"""
 TURN, SIZE, USE, BESIDE, NOISE = 0.06, 0.25, 0.05, 0.15, 0.02
 """Costs that are added to the root mean square difference of two profiles of unit area.
 
 TURN is the cost of a rotation by 90 degrees, and SIZE the cost of a size ratio of e. USE is the cost of each earlier
-use of a cell, and BESIDE the cost of a use next to itself. NOISE is the maximum of a random cost.
+use of a cell, and BESIDE the cost of a use next to another copy of the cell. NOISE is the maximum of a random cost.
 """
 SMALLEST, LARGEST = 0.6, 1.7
 """Minimum and maximum scale factor of a cell. A remaining difference in size is reached by bending."""
@@ -36,9 +39,9 @@ TRUSTED = 0.5
 GROUP = 256
 """Number of targets that are compared at once, to limit memory."""
 ENOUGH = 6
-"""Number of complete and certain cells that is enough to leave out less certain cells."""
+"""Minimum number of complete and certain cells for which less certain cells are not used."""
 FEW = 3
-"""Number of complete cells, of any certainty, that is enough to leave out cells that the border cuts."""
+"""Minimum number of complete cells, of any certainty, for which cells that the border cuts are not used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +80,7 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     wanted : Tessellation
         Target cells.
     chosen : (targets,) int
-        Indices of the targets. Earlier ones get their cells first.
+        Indices of the targets. Earlier targets choose their cells first.
     turns : bool
         If True, cells may be rotated.
     seed : int

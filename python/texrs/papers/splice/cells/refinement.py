@@ -35,7 +35,7 @@ SMALLEST = 24.0
 GRAIN, FINE = 0.24, 2.0
 """Minimum share of fine detail in the variance inside cells.
 
-Standard deviation of the filter that removes it, in pixels.
+The second number is the standard deviation of the filter that removes fine detail, in pixels.
 
 Smooth cells, and cells with a single figure such as a honeycomb's bottom, look better stretched than corrected.
 """

@@ -241,7 +241,7 @@ def judge_places(
 
 
 def make_patch(window: Window, corner: NDArray[np.intp], shape: NDArray[np.intp]) -> tuple[NDArray[np.uint32], Bools]:
-    """Return the pixels of A that a window would show, as flat indices, and True for those inside the image."""
+    """Return the pixels of A that a window would show, as flat indices, and True for pixels inside the image."""
     at = window.off + corner
     ok = ((at >= 0) & (at < shape)).all(axis=-1)
     rows, columns = np.moveaxis(np.clip(at, 0, shape - 1), -1, 0)
