@@ -20,7 +20,7 @@ use crate::foundation::par::Monitor;
 use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
 
-/// Number of processed pixels between checks of the monitor.
+/// Number of processed pixels between checks for cancellation.
 const BREATH: usize = 1 << 16;
 
 /// Returns the image that results from repeated dilation of `seed`, limited by `mask` after each step. The seed is

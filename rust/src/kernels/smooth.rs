@@ -142,7 +142,7 @@ fn pass<T: Number>(
         }
     }
     let source = &source[..];
-    // Along the last axis, extend each line and sum along it.
+    // Along the last axis, extend each line beyond its ends and sum along it.
     if inner == 1 {
         par::chunks_mut(to, ROWS * count, |chunk, lines| {
             let mut line = vec![0.0; length + LANES];

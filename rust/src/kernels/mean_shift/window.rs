@@ -252,7 +252,7 @@ pub(super) mod v3 {
         let mut sums = [zero; C];
         let (mut count, mut down) = (zero, zero);
         let mut passed = avx._mm256_setzero_si256();
-        // Sum row by row, as in the plain version.
+        // Sum row by row in the same order as the plain version, so that both give the same bits.
         for y in 0..height {
             let start = (at[0] + y) * planes.stride + at[1];
             let mut rows: [&[Lanes]; C] = [&[]; C];

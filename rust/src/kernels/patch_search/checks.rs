@@ -4,7 +4,7 @@ use super::{Exemplar, Pick};
 use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
-/// Maximum number of positions of an exemplar, because a candidate has 32-bit coordinates.
+/// Exclusive limit of the number of positions of an exemplar, because a candidate has 32-bit coordinates.
 const LONGEST: usize = u32::MAX as usize;
 
 pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
@@ -16,7 +16,7 @@ pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()>
         );
         return Err(Error::value("exemplars", message));
     }
-    // Check block by block, without branches inside a block.
+    // Check block by block, without branches inside a block, so that the loop vectorises.
     let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
     let block = exemplar.data.chunks(4096).find(|block| !sound(block));
     if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {

@@ -176,7 +176,7 @@ impl Prepared {
         )
     }
 
-    /// Returns a cost that no position exceeds.
+    /// Returns an upper bound of the cost of all positions.
     pub(super) fn largest_cost(&self, scale: f64) -> f64 {
         let total = self.total_weight() * self.channels as f64;
         (total * (scale + self.largest).powi(2)).max(f64::MIN_POSITIVE)

@@ -4,7 +4,7 @@ use super::{Block, Exemplar, Index, once};
 use crate::foundation::libm::power_below;
 use crate::foundation::par;
 
-/// Data of the exemplars for the filter.
+/// Spectra of the exemplars, which the filter correlates with patches.
 pub(super) struct Spectra {
     /// Interleaved spectra. Each block has one layer for each channel, then a layer of squares.
     pub(super) values: Vec<f32>,

@@ -27,7 +27,7 @@ use crate::foundation::simd::wide_fn;
 /// twice as many systems for each row.
 const DEPTH: usize = 2;
 
-/// Minimum number of rows for a reduction to be worthwhile.
+/// Number of rows below which a reduction is not worthwhile.
 const FEW: usize = 4;
 
 /// Rows that are added to a solution: every second row of an array.

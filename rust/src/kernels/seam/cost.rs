@@ -155,7 +155,7 @@ const LANES: usize = 16;
 /// # Errors
 /// A cost is negative or not finite.
 pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<f32> {
-    // NaN fails this comparison too. Entries are checked in blocks without branches.
+    // NaN fails this comparison too. Entries are checked in blocks without branches, so that the loop vectorises.
     let sound = |c: f32| (0.0..f32::INFINITY).contains(&c);
     let (mut largest, mut bad) = ([0.0f32; LANES], [0u32; LANES]);
     let (blocks, rest) = costs.as_chunks::<LANES>();

@@ -21,10 +21,10 @@ pub struct Energy<'a, const D: usize> {
     /// Costs of false and of true at each point, which may be negative. One of them may be
     /// infinite, which forbids the label.
     pub unary: &'a [[f32; 2]],
-    /// Cost if a point is false and the next one along the axis is true, at least 0. Entries
-    /// without a next point are ignored.
+    /// Cost if a point has label false and the next point along the axis has label true, at least 0. Entries without a
+    /// next point are ignored.
     pub forward: [&'a [f32]; D],
-    /// Cost if a point is true and the next one along the axis is false.
+    /// Cost if a point has label true and the next point along the axis has label false.
     pub backward: [&'a [f32]; D],
 }
 

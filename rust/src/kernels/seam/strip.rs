@@ -74,7 +74,7 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     while longest * scale >= (LONGEST / 2) as f64 {
         scale *= 0.5;
     }
-    // No single cost exceeds the largest sum along a line, so each rounded cost fits.
+    // No single cost exceeds the largest sum along a line, so each rounded cost fits `i32`.
     let rounded = |costs: &[f32]| -> Vec<u32> {
         let round = |&c: &f32| (f64::from(c) * scale + 0.5) as i32 as u32;
         costs.iter().map(round).collect()

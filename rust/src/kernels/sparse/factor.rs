@@ -227,7 +227,7 @@ impl Task<'_> {
 struct Bench {
     /// The columns of a block.
     own: Vec<f64>,
-    /// Rows that are consecutive in a child and in a block.
+    /// Runs of rows that are consecutive both in a child's contribution and in its parent's front.
     runs: Vec<dense::Run>,
 }
 

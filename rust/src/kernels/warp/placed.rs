@@ -121,7 +121,7 @@ impl Motion {
     /// Moves a shape. Returns the source coordinates and distances of the pixels of a window.
     ///
     /// # Errors
-    /// The distances do not fit the box, memory for the window is not available, or the monitor was
+    /// The number of distances does not match the box, memory for the window is not available, or the monitor was
     /// cancelled.
     pub fn place(
         &self,

@@ -74,7 +74,7 @@ pub fn min_cut<const D: usize>(graph: &Graph<'_, D>, monitor: &Monitor) -> Resul
 const ROOT: u8 = 254;
 /// Parent of a node that waits for adoption, and of free nodes.
 const ORPHAN: u8 = 255;
-/// Number of nodes grown between checks of the monitor.
+/// Number of nodes taken from the queue between checks for cancellation.
 const BREATH: usize = 4096;
 /// Number of values of [`Node::ends`].
 const ENDS: usize = 64;
@@ -113,7 +113,8 @@ struct Node<const D: usize> {
     tree: Tree,
     /// Whether the node is in the queue.
     active: bool,
-    /// Bits of the ends of wrapped axes where this node is. They select the row of neighbour offsets.
+    /// Flags from [`Layout::ends`]: whether the node is at an end of a wrapped axis. They select the row of neighbour
+    /// offsets.
     ends: u8,
 }
 

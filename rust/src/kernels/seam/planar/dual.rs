@@ -76,8 +76,8 @@ impl Dual {
                     sum += u64::from(cost);
                 }
             }
-            // Row above this level. The first and the last level of an open strip have pixels on
-            // one side only.
+            // Index of the row of pixels above this level of faces. The first and the last level of an open strip have
+            // pixels on one side only.
             let above = match (l, strip.cyclic) {
                 (0, true) if rows > 1 => rows - 1,
                 (0, _) => continue,

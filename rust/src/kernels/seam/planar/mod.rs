@@ -73,7 +73,7 @@ const WEST: usize = 2;
 const NORTH: usize = 3;
 /// Value of `Face::step` where a search starts.
 const START: u8 = 4;
-/// Number of faces taken between checks of the monitor.
+/// Number of faces taken from the queue between checks for cancellation.
 const BREATH: usize = 1 << 14;
 
 /// Returns a direction as an angle in eighths of a turn, clockwise from east.
