@@ -31,7 +31,9 @@ Item = Any
 
 
 class Failed(TexrsError):
-    """Some items failed. The results of the others are stored, and the same call tries only the failed items again.
+    """Some items failed.
+
+    The results of the other items are stored, and the same call tries only the failed items again.
 
     Attributes
     ----------

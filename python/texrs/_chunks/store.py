@@ -48,7 +48,7 @@ class Stored:
     chunks : int
         Number of chunks of all maps and levels, or number of items.
     made : int
-        Number of chunks or items computed in this call. The others were already stored.
+        Number of chunks or items computed in this call. All other chunks or items were already stored.
     seconds : float
         Duration of the call, in seconds.
 

@@ -192,7 +192,7 @@ class _Process:
     """A worker process and its queue of tasks, whose first task is running."""
 
     def __init__(self, payload: bytes, count: int) -> None:
-        # Spawn, because a forked process would inherit locks of threads that it does not have.
+        # Spawn the process, because a forked process would inherit locks but not the threads that hold them.
         context = multiprocessing.get_context("spawn")
         heard, self._stop = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(
@@ -306,7 +306,7 @@ def pack(work: Work) -> bytes:
 
 
 def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
-    """Return a client, and whether this function created it."""
+    """Return a client, and True if this function created it."""
     try:
         from distributed import Client
     except ImportError:
@@ -352,7 +352,7 @@ def _run_cluster(
     rows = [
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
-    # For each submitted batch: its slot, its task numbers and ``alone``. A cluster blames all tasks that wait at a
+    # Map each submitted batch to its slot, its task numbers and ``alone``. A cluster blames all tasks that wait at a
     # lost worker, so suspects are then run alone, with no other task submitted.
     known: dict[Any, tuple[int, list[int], bool]] = {}
     suspects: deque[tuple[int, int]] = deque()

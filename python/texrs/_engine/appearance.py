@@ -27,10 +27,9 @@ class Demand(NamedTuple):
     Attributes
     ----------
     exemplar : (samples * 4) int16
-        Four values of each sample of the exemplar, -2048 to 2047. Unused ones are 0.
+        Four values of each sample of the exemplar, -2048 to 2047. Unused values are 0.
     output : (points * 4) or (points) int16
-        Requested values at the points of the output. If there is a single value per point, it is the first one, and
-        the others are 0.
+        Requested values at the points of the output. With a single value per point, the other three values are 0.
     weight : (points) or (1) uint16
         Cost of a squared difference of one, in 1/256: one number per point, or a single one. Windows that are not
         related differ by about 2 * 512^2. If 0, nothing is requested.

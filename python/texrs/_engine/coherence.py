@@ -53,8 +53,9 @@ def find_similar(
     """Find the most similar samples for each sample of an exemplar, far from it and from each other.
 
     C_1 is the sample itself. Each further C_j is the sample with the nearest appearance vector among all samples that
-    are far enough from the earlier ones. Far enough is more than (n - 1) / 2 samples along some axis [1]_. The whole
-    exemplar is searched, and the result is exact. The first one of equally near samples is used.
+    are far enough from the earlier samples. The distance is sufficient if it is more than (n - 1) / 2 samples along
+    some axis [1]_. The whole exemplar is searched, and the result is exact. If several samples are equally near, the
+    first is used.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def find_similar(
     k : int
         Number of samples in a set, 1 to 16.
     n : int
-        Side of the box around each chosen sample that excludes other samples; an odd number.
+        Side of the box around each chosen sample that excludes other samples, an odd number.
     numbers : {8, 24}
         Number of leading components of the vectors that are compared.
     progress : callable, optional
@@ -117,7 +118,7 @@ def correct(
     A pass visits the 2^A classes of points with the same parity along each axis, in fixed order [1]_. The source
     samples of a point's 2^A diagonal neighbours, and samples similar to them, are candidates. They are shifted back to
     the point, in the direction that the frames give. Candidates are compared by the appearance vectors of the
-    neighbours. The first one of equally good candidates is used.
+    neighbours. If several candidates are equally good, the first is used.
 
     Parameters
     ----------
@@ -139,8 +140,8 @@ def correct(
     held : (points) bool, optional
         True for points whose coordinates are fixed.
     kinds : (samples) uint8 and (points) uint8, optional
-        Class of each sample, and the class that each point requires; 255 allows any class. A point without a suitable
-        candidate keeps its coordinates.
+        Class of each sample, and the class that each point requires. The value 255 allows any class. A point without a
+        suitable candidate keeps its coordinates.
     progress : callable, optional
         Function called with the completed share. An exception that it raises stops the work.
 

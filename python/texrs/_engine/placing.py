@@ -31,8 +31,8 @@ def measure_outlines(labels: Labels, windows: Sequence[Window]) -> list[Floats |
     Returns
     -------
     list of (rows, columns) float32, or None
-        Distance in pixels from each pixel to the nearest pixel on the other side of the outline; negative outside the
-        shape. None if all pixels of a window are on the same side.
+        Distance in pixels from each pixel to the nearest pixel on the other side of the outline, negative outside the
+        shape. An entry is None if all pixels of its window are on the same side.
 
     Examples
     --------

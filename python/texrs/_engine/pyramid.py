@@ -104,7 +104,7 @@ def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.
     Parameters
     ----------
     field : Field, optional
-        Field of `texrs.fields`. None is the identity.
+        Field of `texrs.fields`. None stands for the identity.
     region : Region
         Region of a lattice whose points are ``step`` voxels apart: point i is at (i + 1/2) step - 1/2.
     step : int

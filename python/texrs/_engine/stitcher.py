@@ -93,7 +93,7 @@ class Shown(NamedTuple):
     seams : (points * A) float32
         Cost of the seam from each point to the next one along each axis.
     distortion : (points) float32
-        Deviation of the patch from the field at each point. Empty if all points have the same frame.
+        Deviation of the patch from the field at each point. The array is empty if all points have the same frame.
     table : (patches, K) int32
         Data of each patch. They are the position of its centre relative to the first point, and the source coordinates
         and the Jacobian there. Then follow the side in units of 1/4096 of a sample, and 1 for a rigid patch.
@@ -396,7 +396,7 @@ class Samples:
     colours : (n, C) float32
         Colours of the samples: up to four channels of any scale.
     depth : (n) float32
-        Depth of each sample inside an element, in pixels; 0 between elements.
+        Depth of each sample inside an element, in pixels, or 0 between elements.
     weights : (float, float)
         Costs of a seam by colour and by depth, as in `Weights`.
 

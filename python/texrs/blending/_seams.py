@@ -24,8 +24,8 @@ WINDOW = np.round(BELL / (2 * BELL.sum() - 1), 15).tolist()
 OUTLINE = (0.35, 0.6)
 """Minimum shares of the step across a seam that are also present in one of its sources.
 
-Above the first share, the seam may be an outline of an element; above the second, it certainly is. For seams through
-noise, the share is at most 0.25.
+Above the first share, the seam may be an outline of an element. Above the second share, it certainly is an outline.
+For seams through noise, the share is at most 0.25.
 """
 
 
@@ -108,7 +108,7 @@ class Seam:
 def measure_outlines(
     step: Floats, own: tuple[Floats, Floats], at: tuple[Array, ...], shape: tuple[int, ...], *, cyclic: bool
 ) -> Floats:
-    """Return how certainly each pair of neighbours is on an outline of an element that covers others, 0 to 1.
+    """Return the certainty, 0 to 1, that each pair of neighbours is on the outline of a covering element.
 
     On an outline, one of the sources contains most of the step itself. The steps are summed along the seam, because in
     noise a single pair may agree by chance.

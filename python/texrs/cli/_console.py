@@ -57,7 +57,7 @@ PYTHON = {
 """Patterns for Python expressions in errors and help texts, and the replacement of each on the command line."""
 _HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 KEPT: list[str] = []
-"""Names of finished files of a batch, which are listed if the rest fails."""
+"""Names of finished files of a batch, which are listed if a later part of the batch fails."""
 
 
 class Stopped(BaseException):
@@ -202,7 +202,7 @@ def say_error(error: Exception) -> str:
 
 
 def suggest(word: str, known: Iterable[str]) -> str:
-    """Return a question that suggests the most similar known word. Empty if none is similar.
+    """Return a question that suggests the most similar known word, or an empty text if no word is similar.
 
     Examples
     --------

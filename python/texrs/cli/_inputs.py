@@ -26,7 +26,7 @@ __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 OF_VOLUMES = ("solid", "slice")
 """Commands whose inputs are volumes."""
 SHOWN = 8
-"""Maximum number of names that a notice lists. It gives only the number of further names."""
+"""Maximum number of names that a notice lists. The notice gives only the number of further names."""
 FIELDS = re.compile(r"\{(input|name|folder|suffix|preset|seed|verb|parent(?:[2-9]|[1-9][0-9])?)\}")
 """Pattern of the words in braces that are replaced, such as ``{name}``."""
 
@@ -39,7 +39,7 @@ class Source:
     """Text of the input as a command-line argument."""
     name: str
     suffix: str = ""
-    """Suffix of the file. Empty for a material."""
+    """Suffix of the file, or an empty text for a material."""
     folder: str = ""
     """Folder of the input, relative to the folder or pattern that the user gave."""
     maps: int = 0
@@ -88,7 +88,10 @@ class _Found:
     suffixes: tuple[str, ...]
     out: str
     files: dict[str, str] = field(default_factory=dict)
-    """Found files, each with the folder that its path is relative to. Empty for files that were named one by one."""
+    """Found files, each with the folder that its path is relative to.
+
+    The folder is empty for files that were named one by one.
+    """
     walked: set[str] = field(default_factory=set)
     """Folders that were searched completely."""
 

@@ -60,7 +60,7 @@ class Kind:
     read: Callable[[Any, About], Any]
     """Function that converts the text, or the list of texts, to the value."""
     note: str | tuple[str, str] = ""
-    """Additional description for the help. Images and volumes can have different ones."""
+    """Additional description for the help. Images and volumes can have different descriptions."""
     show: Callable[[Any], str] = str
     """Function that converts a default value to its text."""
     file: bool = False

@@ -44,11 +44,11 @@ class Option:
     type: Any
     """Type of the parameter for typer."""
     kind: Kind | None
-    """Kind that converts the text to the value. None if typer converts it."""
+    """Kind that converts the text to the value, or None if typer converts the text."""
     default: Any
     """Default of the function, as text. `MISSING` if the command line must provide a value."""
     required: bool
-    """Whether the function has no default for the parameter."""
+    """If True, the function does not have a default for the parameter."""
     info: Any
     """Option or argument object of typer."""
 
@@ -59,12 +59,12 @@ class Option:
 
     @property
     def argument(self) -> bool:
-        """Whether this is a positional argument."""
+        """If True, this is a positional argument."""
         return not self.flag.startswith("--")
 
     @property
     def file(self) -> bool:
-        """Whether the value is read from a file that the text names."""
+        """If True, the value is read from a file that the text names."""
         return self.kind is not None and self.kind.file
 
     def name_value(self, text: object) -> str:
@@ -316,7 +316,7 @@ def _split_union(annotation: Any) -> tuple[Any, ...]:
 
 
 def _find_type(annotation: Any, default: Any) -> Any:
-    """Return the type that typer can convert, or the kind of a choice of words. None for other types."""
+    """Return the type that typer can convert, the kind of a choice of words, or None for other types."""
     parts = [part for part in _split_union(annotation) if part is not types.NoneType]
     if all(get_origin(part) is Literal for part in parts):
         return make_choice([word for part in parts for word in get_args(part)], optional=default is None)

@@ -46,7 +46,7 @@ MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "Ex
 NO_MATERIALS = ("batch", "samples")
 """Commands that do not read a folder as a material. Their outputs can be in a folder of inputs."""
 MATTER = ("out", "folder", "size", "seed", "seeds", "options", "field", "wrap", "slant", "at")
-"""Options that the help of a command lists before the others. The first three of them come first."""
+"""Options that the help of a command lists first. The first three that a command has are its main options."""
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write. Its suffix selects the format."),
@@ -98,7 +98,7 @@ class Command(TyperCommand):
     """A command that never overwrites its inputs. Every file name that is not an output counts as an input."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """List the options in groups: the most important ones, the others, groups by subject, other files, and limits."""
+        """List the options in groups: the main options, further options, groups by subject, other files, and limits."""
         sections: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Arguments", MAIN, MORE)}
         last: dict[str, list[tuple[str, str]]] = {title: [] for title in (FILES, WORK)}
         options = [p for p in self.get_params(ctx) if p.param_type_name == "option"]

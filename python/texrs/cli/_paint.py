@@ -104,7 +104,7 @@ def paint_command(
         texture = SolidTexture(**call)
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
         if followed:
-            # The field rotates the texture at the scale that it has on the mesh.
+            # Find the scale first, because the field depends on the size of the texture on the mesh.
             if "scale" not in painted:
                 painted["scale"] = find_scale(surface, texture, **painted)
             texture = SolidTexture(

@@ -170,7 +170,7 @@ def read_mask(path: str, axes: int = 2) -> Array:
 
 
 def name_file(path: str) -> str:
-    """Return the name of a file that the function reads later. None if it is not given."""
+    """Return the name of a file that the function reads later, or None if the name is not given."""
     if not io.is_store(path):
         check_file(Path(path))
     return path
@@ -182,7 +182,7 @@ def read_hole(text: str, about: About) -> Any:
 
 
 def is_number(text: str) -> bool:
-    """Return whether a text is a number and not the name of a file."""
+    """Return True if a text is a number and not the name of a file."""
     try:
         float(text)
     except ValueError:

@@ -34,7 +34,7 @@ __all__ = [
 
 KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".gif", ".npz"))
 KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s != ".npz")
-"""Formats that results have in common with their inputs. Inputs of other formats give .png or .npy."""
+"""Formats that results have in common with their inputs. Results of inputs in other formats are .png or .npy files."""
 LOSSY = (".jpg", ".jpeg", ".webp", ".avif", ".jxl")
 EXACT = ("scale-map",)
 """Commands whose results are measurements. Their results are not written in lossy formats."""
@@ -205,7 +205,7 @@ def list_files(recipe: Recipe, parameters: Sequence[Any]) -> list[str]:
 
 
 def names_file(parameter: Any) -> bool:
-    """Return whether an option or an argument of a command can name an input file."""
+    """Return True if an option or an argument of a command can name an input file."""
     if parameter.param_type_name == "argument":
         return True
     return parameter.name not in OUTPUTS and re.search("FILE|csv", parameter.metavar or "") is not None

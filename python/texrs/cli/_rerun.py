@@ -120,7 +120,8 @@ class Recipe:
         folder = os.path.dirname(os.path.realpath(self.path))
         found, wrong = {}, []
         for name, sha in self.inputs.items():
-            # Search in the folder of the result, in the current folder, and next to the result.
+            # Search for the recorded path relative to the result, then relative to the current folder, and for the
+            # file name next to the result.
             places = (os.path.join(folder, name), name, os.path.join(folder, os.path.basename(name)))
             there = [os.path.normpath(p) for p in places if os.path.isfile(p) or io.is_store(p)]
             same = next((p for p in there if hash_file(p) == sha), None)

@@ -64,7 +64,7 @@ class Verb:
     scaled: bool = True
     """If True, a pixel of the result shows the same length as a pixel of the first input."""
     fills: bool = False
-    """If True, the command fills pixels of the first input and keeps the others in place.
+    """If True, the command fills pixels of the first input and keeps all other pixels in place.
 
     A transparent input can then become opaque.
     """

@@ -177,7 +177,7 @@ def tell_filled_volume(result: Synthesis) -> str:
 
 
 def tell_sizes(result: Synthesis) -> str:
-    """Return a text about where sizes were measured, and the confidence. Empty if they were not measured."""
+    """Return a text with the source and confidence of measured sizes, or an empty text without a measurement."""
     found = result.report["measured"]
     if found is None:
         return ""
@@ -201,20 +201,20 @@ def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the option for the angle of view of an exemplar, from its metadata. Empty if it is not stated."""
+    """Return the option for the angle of view of an exemplar, or no option if its metadata do not state the angle."""
     said = (given["scale_map"] or "").startswith(PLANE)
     fovs = [] if said else list(read_camera({"image": given["exemplar"]}).values())
     return {("fov",): fovs[0]} if fovs else {}
 
 
 def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the option for the angle of view of a photograph, from its metadata. Empty if it is not stated."""
+    """Return the option for the angle of view of a photograph, or no option if its metadata do not state the angle."""
     fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
     return {} if fov is None else {("view", "fov"): fov}
 
 
 def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return the option for the voxel spacing of a volume, from its file. Empty if it is not stated."""
+    """Return the option for the voxel spacing of a volume, or no option if its file does not state the spacing."""
     spacing = read_stated_spacing(given["exemplar_image"])
     return {} if spacing is None else {("spacing",): spacing}
 

@@ -1,9 +1,9 @@
 """Compare results of texrs with results of other programs for the same images, on one page.
 
 There are three tasks: more of a texture, an image without a seam, and a filled hole. For each task, the page shows
-methods of texrs, methods of other programs that are installed, and trivial ones, such as copies side by side. It also
-lists the programs that are not installed and how to get them. All methods get the same 8-bit RGB images. Measures use
-only the pixels of a result, so no method benefits from its own report. A method that fails is shown as failed.
+methods of texrs, methods of other programs that are installed, and trivial methods, such as copies side by side. It
+also lists the programs that are not installed and how to get them. All methods get the same 8-bit RGB images. Measures
+use only the pixels of a result, so no method benefits from its own report. A method that fails is shown as failed.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Comparison:
     timed : bool
         If True, the page reports the time of each method.
     holes : mapping of str to (H, W) bool array
-        Mask of the hole in each image, by the name of the image. Empty if the task was not done.
+        Mask of the hole in each image, by the name of the image. The mapping is empty if holes were not a task.
 
     """
 
@@ -150,7 +150,7 @@ def compare(
 
 
 def check_programs(programs: Mapping[str, str]) -> dict[str, str]:
-    """Check that the programs are known and executable; return their absolute paths."""
+    """Check that the programs are known and executable, and return their absolute paths."""
     for name, path in programs.items():
         if name not in PROGRAMS:
             raise InvalidInput(f"programs: must be one of {', '.join(PROGRAMS)}, got {name!r}")
@@ -182,7 +182,7 @@ def blank(picture: Array, hole: Bools) -> Array:
 
 
 def attempt(do: Callable[[Request], Array], request: Request) -> tuple[Array | None, float, str]:
-    """Run a method; return its result, its processor seconds, and the reason if it failed."""
+    """Run a method. Return its result, its processor seconds, and the reason if it failed."""
     start = count_seconds()
     try:
         made = do(request)

@@ -97,14 +97,14 @@ def put_side_by_side(asked: Request) -> Array:
 
 
 def run(*words: object) -> None:
-    """Run a program; raise its error output if it fails."""
+    """Run a program. If it fails, raise an error with its error output."""
     done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=PATIENCE)
     if done.returncode != 0:
         raise TexrsError(done.stderr.strip() or f"failed with exit code {done.returncode}")
 
 
 def run_embark(more: bool, program: str, asked: Request) -> Array:
-    """Let Embark's texture-synthesis generate a texture, or fill a hole: black pixels are filled, white ones kept."""
+    """Let Embark's texture-synthesis generate a texture, or fill a hole, which is black in its mask."""
     height, width = (asked.size, asked.size) if more else asked.picture.shape[:2]
     with tempfile.TemporaryDirectory() as folder:
         example, mask, out = (Path(folder, f"{n}.png") for n in ("example", "mask", "out"))

@@ -39,6 +39,6 @@ def _mix(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def number_tiles(corners: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the index of the tile between each four corners; the result has one row and column fewer."""
+    """Return the index of the tile between each four corners, with one row and column fewer than the corners."""
     found = corners[:-1, :-1] * 27 + corners[:-1, 1:] * 9 + corners[1:, :-1] * 3 + corners[1:, 1:]
     return np.asarray(found, np.intp)

@@ -26,7 +26,7 @@ Closer pieces would repeat its content.
 Place = tuple[int, int, int]
 """Index of an image, and a row and a column in it."""
 Places = NDArray[np.int32]
-"""Source position of each pixel: image, row, column; (..., 3)."""
+"""Source position of each pixel as (image, row, column), (..., 3)."""
 
 
 @dataclass(frozen=True, slots=True)

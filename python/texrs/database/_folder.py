@@ -189,7 +189,7 @@ class Folder:
         raise FileError(f"{self.path}: other processes keep creating and removing the folder")
 
     def _is_lock(self, number: int) -> bool:
-        """Return whether an open file is still the lock file of the folder."""
+        """Return True if an open file is still the lock file of the folder."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(number), os.stat(self.path / LOCK))
         return False
@@ -209,7 +209,7 @@ def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
 
 
 def _lock_file(number: int) -> bool:
-    """Lock an open file and return whether this worked. The lock ends when the file is closed or the process dies."""
+    """Lock an open file, and return True on success. The lock ends when the file is closed or the process dies."""
     try:
         try:
             import fcntl

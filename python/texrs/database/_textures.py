@@ -69,7 +69,7 @@ class Matrix:
     columns: tuple[str, ...]
     """Names of the textures that supply the arrangement, one for each column of the sheet."""
     results: Mapping[tuple[str, str], Synthesis]
-    """Splices by (row name, column name). Empty if they were passed to ``each``."""
+    """Splices by (row name, column name), or no splices if they were passed to ``each``."""
     sheet: NDArray[np.uint8]
     """Image with thumbnails of all splices, and of the textures along its left and upper edges."""
     failed: Mapping[tuple[str, str], str]

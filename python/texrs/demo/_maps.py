@@ -90,7 +90,7 @@ def guess_height(labels: Labels, picture: Array) -> Array:
     """Estimate a relief (uint16): domes over the elements, with the fine grain of the image."""
     depth = np.zeros(labels.shape)
     for label in range(1, int(labels.max()) + 1):
-        # Compute the distance within each element, because touching elements have a valley between them.
+        # Compute the distance separately for each element, so that touching elements have a valley between them.
         inside = distance_transform_edt(np.pad(labels == label, 1, mode="edge"))[1:-1, 1:-1]
         depth += inside / max(float(inside.max()), 1.0)
     dome = np.sqrt(1 - (1 - np.clip(depth, 0, 1)) ** 2)

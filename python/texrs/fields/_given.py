@@ -30,7 +30,7 @@ _OPTIONS = ("along", "order", "up", "signed")
 
 
 def is_file(text: str) -> bool:
-    """Return whether a text is the name of a file of vectors or frames, instead of a description of a field."""
+    """Return True if a text is the name of a file of vectors or frames, instead of a description of a field."""
     return _split(text)[0].lower().rstrip("/").endswith(SUFFIXES) or io.is_store(_split(text)[0])
 
 
@@ -113,7 +113,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
 def as_field(
     value: object, axes: int, extent: Sequence[int] | None = None, *, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Convert a field, a text, an array, or a file of an array to a field. None is returned as None.
+    """Convert a field, a text, an array, or a file of an array to a field. The value None gives None.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ class _Grid(Field):
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
-            if not weight.any():  # Skip corners without weight: adding zeros would not change a bit.
+            if not weight.any():  # Skip corners without weight, because adding zeros does not change the sums.
                 continue
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:

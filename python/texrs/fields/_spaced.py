@@ -81,7 +81,7 @@ def find_distances(spacing: Sequence[float] | None, value: object, axes: int) ->
 
 
 def as_distances(spacing: Sequence[float] | None, axes: int) -> tuple[float, ...]:
-    """Return the checked distances between voxels along each axis. None means 1."""
+    """Return the checked distances between voxels along each axis. If None, they are 1."""
     if spacing is None:
         return (1.0,) * axes
     given = as_tuple(spacing, "spacing", axes, f"{axes} numbers, {_AXES[axes - 2]}")

@@ -50,7 +50,7 @@ class Scales:
     target : (rows, columns) float32, optional
         Requested scale of each pixel. None if scales are not restricted.
     strength : float
-        Factor on the weight of the scales. The usual weight is 1.
+        Factor on the weight of the scales, usually 1.
     held : Held, optional
         Fixed points, by their source samples in the atlas.
 

@@ -62,7 +62,7 @@ class Settings:
     exhaustive: int = 0
 
     def at(self, level: int, levels: int) -> Step:
-        """Return the settings of a level; 0 is the coarsest."""
+        """Return the settings of a level, counted from 0 for the coarsest level."""
         which = 2 if level == levels - 1 else 1 if level else 0
         return Step(self.passes[which], self.reaches[which], self.votes[which], self.weights[which])
 

@@ -74,7 +74,7 @@ def from_patches(
         If True, patches bend with a field. Default: True if the exemplar's edges have a direction and its elements are
         not separate.
     larger : float
-        Factor on the usual side of the patches; 1 is the usual side.
+        Factor on the usual side of the patches. Default: 1.
     plain : bool
         If True, elements do not change the costs of seams.
     """
@@ -112,7 +112,7 @@ def from_patches(
 def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bool:
     """Return True if patches of an exemplar bend with a field.
 
-    The request ``bend`` decides. Without it, patches bend if edges have a direction and elements are not separate.
+    If ``bend`` is given, it decides. Otherwise patches bend if edges have a direction and elements are not separate.
     """
     if bend is not None or not varies:
         return varies and bool(bend)

@@ -98,7 +98,7 @@ class Ground:
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
     ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]]:
-        """Divide a box; return the parts with their centres, frames, and ranges of source positions for the centre.
+        """Divide a box. Return the parts with their centres, frames, and ranges of source positions for the centre.
 
         A box with different frames is divided across the axis along which they differ most: at a fold, or in the
         middle. A box that does not fit into the exemplar is divided across its longest side.

@@ -32,10 +32,10 @@ class Box:
     costs : (M,) float32
         Costs of these seams.
     places : (..., A) int32
-        Source coordinates of each point. Empty if all patches are rigid, because the table then determines the
-        coordinates.
+        Source coordinates of each point. The array is empty if all patches are rigid, because the table then
+        determines the coordinates.
     distortion : (...) float32
-        Deviation of the patch from the field at each point. Empty if all patches are rigid.
+        Deviation of the patch from the field at each point. The array is empty if all patches are rigid.
 
     """
 

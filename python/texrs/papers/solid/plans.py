@@ -32,7 +32,7 @@ class Plan:
     """A method of cutting and stitching patches."""
 
     larger: float = 1.0
-    """Factor on the usual side of the patches; 1 is the usual side."""
+    """Factor on the usual side of the patches."""
     plain: bool = False
     """If True, elements do not change the costs of seams."""
 

@@ -32,7 +32,9 @@ Nets are more flexible than walls.
 
 
 def adjust_targets(a: ElementAnalysis, match: Match, *, snap: bool, part: bool = False) -> Match:
-    """Push disjoint elements apart; for connected figures, limit their strain, and straighten rows if ``snap`` is True.
+    """Push disjoint elements apart, or limit the strain of connected figures.
+
+    If ``snap`` is True, also straighten rows.
 
     If ``part`` is True, disjoint elements that touch in the texture may still touch. This is used for a strength below
     1, and for elements in their own layout.

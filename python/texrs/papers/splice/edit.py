@@ -73,7 +73,7 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
     points : (n, 2) array
         Elements of the image, followed by their copies beyond its borders.
     originals : int
-        Number of elements in the image. Steps that name elements do not move copies; other steps do.
+        Number of elements in the image. Steps that name elements do not move copies, but other steps do.
     steps : sequence
         Steps as returned by `as_steps`.
     nameable : int, optional

@@ -81,7 +81,10 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
 
 def choose_coarseness(shape: Sequence[int]) -> int:
-    """Return the distance between solved pixels of a connected figure, in pixels; 1 solves every pixel."""
+    """Return the distance between solved pixels of a connected figure, in pixels.
+
+    With 1, all pixels are solved.
+    """
     step = 1
     while math.prod(-(-n // step) for n in shape) > MOST:
         step *= 2
@@ -116,7 +119,7 @@ def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, uprig
 def make_energy_triangle(
     rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE
 ) -> Any:
-    """Return the lower triangle of the matrix of Eq. 5, because `texrs.kernels.sparse` does not read the rest."""
+    """Return the lower triangle of the matrix of Eq. 5, the only part that `texrs.kernels.sparse` reads."""
     coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
     u = weigh_neighbours(rigid, axis, coupling, small)
     u /= u.sum(axis=0)
@@ -160,7 +163,7 @@ def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int]
 
 
 def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
-    """Return u_pq of each pixel p and its neighbours q above, below, left and right; 0 outside the image.
+    """Return u_pq of each pixel p and its neighbours q above, below, left and right, or 0 for q outside the image.
 
     Table 1 and Figure 5 describe the displacement along columns. For the displacement along rows, the axes are
     exchanged.

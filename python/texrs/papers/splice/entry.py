@@ -45,7 +45,7 @@ def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis
 
 
 def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
-    """Check that the parts of an analysed texture match; return it with points in double precision."""
+    """Check that the parts of an analysed texture match, and return it with points in double precision."""
     image = as_image(entry.image, f"{name}.image", minimum=SHORTEST)
     shape = image.shape[:2]
     mask = np.asarray(entry.mask)

@@ -43,7 +43,7 @@ def make_triangle(
     shape : (int, int)
         Shape of the image, whose pixels are the unknowns, row by row.
     steps : sequence of (int, int)
-        Offsets (rows down, columns to the right) in the order of the pixels; the first one is (0, 0).
+        Offsets (rows down, columns to the right) in the order of the pixels, starting with (0, 0).
     bands : sequence of (H, W) float64
         Matrix entry for each pixel and the pixel at the offset, one array for each offset. Entries outside the image
         are not read. Zeros are stored only on the diagonal.

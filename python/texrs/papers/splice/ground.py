@@ -69,7 +69,7 @@ class Scene:
     a : ElementAnalysis
         The texture without its uneven light.
     light : Light or None
-        The removed light; None if the light was even.
+        The removed light, or None if the light was even.
     own : (h, w) int32
         Number of the element of each pixel, counted from 1. An element includes its matte and the pixels next to it.
         Background is 0, and foreground without an element is -1.
@@ -148,7 +148,7 @@ def lay_ground(
 
 
 def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32], element: NDArray[np.intp]) -> None:
-    """Keep all surroundings of elements that do not move; if none moves, also keep foreground without an element."""
+    """Keep all surroundings of elements that do not move. If all elements stay, also keep other foreground."""
     here = np.moveaxis(np.indices(label.shape, np.int32), 0, -1)
     moved = np.zeros(int(label.max()) + 1, bool)
     moved[label[(places != here).any(axis=-1) & (label > 0)]] = True

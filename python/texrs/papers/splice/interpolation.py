@@ -98,7 +98,7 @@ def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
 
 
 def _make_laplacian(free: Bools) -> Any:
-    """Return the lower triangle of the Laplace equation for free pixels; other pixels have the identity."""
+    """Return the lower triangle of the Laplace equation for free pixels, and of the identity for other pixels."""
     degree = np.zeros(free.shape)
     bands = []
     for axis in range(2):

@@ -63,7 +63,7 @@ def _measure_mean_distance(points: Points) -> float:
 
 
 def fill_literally(draft: Draft, seed: int) -> Draft:
-    """Fill as in section 4.3: holes get random pixels that are not rigid; afterwards all pixels may change."""
+    """Fill as in section 4.3: holes get random pixels that are not rigid. Afterwards all pixels may change."""
     places, holes = draft.places.copy(), ~draft.known
     ground = np.argwhere(draft.kinds == 0)
     places[holes] = ground[np.random.default_rng(seed).integers(len(ground), size=np.count_nonzero(holes))]

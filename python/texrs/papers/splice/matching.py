@@ -73,7 +73,7 @@ class Match:
     assigned : (n) int
         Index of the extension's point for each target.
     scale, angle, gain : float
-        Scale factor and rotation (degrees) of B's layout, and the factor within ``scale`` that gives elements room.
+        Scale factor and rotation (degrees) of B's layout, and the part of the scale factor that makes elements fit.
     cost : float
         Mean squared distance of elements from their targets, in squared pixels.
     wanted : (n, 2) float64, optional
@@ -235,7 +235,7 @@ def keep_cut(a: ElementAnalysis, match: Match, strength: float) -> Match:
 
 
 def find_turns(a: ElementAnalysis, b: ElementAnalysis) -> list[float]:
-    """Return rotations, in degrees, that align a direction of B's points with one of A's; the first one is 0."""
+    """Return rotations in degrees, starting with 0, that align a direction of B's points with one of A's directions."""
     mine, theirs = (t.directions or find_directions(t) for t in (a, b))
     # A line has no forward end, so rotations are from -90 to 90 degrees.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
@@ -290,7 +290,7 @@ def _place_targets(
     if shape is None:
         found = (layout.cover if lattice else layout.within)(first, last)[0]
     else:
-        # Sow a box of the same size for all rotations, so that they can share its points.
+        # Continue the layout in a box of the same size for all rotations, so that they can share its points.
         reach = float(np.hypot(*(high - low))) / 2 / scale + float(np.abs(np.asarray(offset)).max()) / scale
         around = np.floor(centre - reach), np.ceil(centre + reach)
         found, _ = continue_points(layout, shape, first, last, around=around)
@@ -347,7 +347,7 @@ class Edit:
     cyclic : (bool, bool)
         Axes along which the edited layout is periodic.
     shrink : float
-        Scale factor of the layout if it shrinks; 1 if it does not.
+        Scale factor of the layout if it shrinks, and otherwise 1.
 
     """
 

@@ -144,7 +144,7 @@ def _sow_once(
     high: Points,
     radius: Reals | None,
 ) -> Sown | None:
-    """Sow points by their arrangement between the ``ends`` of an image; return None if this area is too small."""
+    """Sow points by their arrangement between the ``ends`` of an image. Return None if this area is too small."""
     unit = float(np.clip(LARGE * scale / (high - low).max(), *DRAWN)) / scale
     too_small = (ends[1] - ends[0]).min() < 2 * SMALLEST * scale
     if len(points) < FEWEST or (high - low).max() * unit > 4 * LARGE or too_small:
@@ -261,7 +261,7 @@ def _fill_gaps(
 
 
 def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float) -> NDArray[np.intp]:
-    """Replace sown elements by others of similar size if the same element is near, starting next to the image."""
+    """Replace sown elements by others of similar size if the same element is near. Begin next to the image."""
     from scipy.spatial import cKDTree
 
     count = len(radius)
@@ -295,7 +295,7 @@ def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
 def _keep_apart(
     found: Sown, own: int, points: Points, apart: float, radius: Reals | None, closest: float = 0.0
 ) -> NDArray[np.intp]:
-    """Return the indices of points that are not too close to earlier ones. The first ``own`` points are all kept."""
+    """Return the indices of points that are not too close to earlier points. The first ``own`` points are all kept."""
     from scipy.spatial import cKDTree
 
     far = apart if radius is None else 2 * float(radius.max())

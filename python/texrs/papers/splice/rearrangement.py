@@ -76,7 +76,7 @@ class Rearrangement:
 
 
 def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
-    """Put the elements of a texture where an edit moves them; return None if too little background is visible.
+    """Put the elements of a texture where an edit moves them. Return None if too little background is visible.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def align_boxes(fragment: Points, whole: Points, cut: Bools) -> Points:
 
 
 def find_room(goal: Points, radius: Points, comes: Bools) -> NDArray[np.intp]:
-    """Return the elements that are shown. Entering ones are left out if they have no room; later ones choose first."""
+    """Return the elements that are shown. Entering elements need room, and later ones choose their places first."""
     kept = np.flatnonzero(~comes).tolist()
     for k in np.flatnonzero(comes)[::-1].tolist():
         if not (np.hypot(*(goal[kept] - goal[k]).T) < CROWDED * (radius[kept] + radius[k])).any():

@@ -46,7 +46,7 @@ PATCH, LEAST = 0.33, 6
 Smaller patches have no reliable roughness.
 """
 STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
-"""Maximum gradient that counts as roughness, in median gradients; a larger one counts as an edge.
+"""Maximum gradient that counts as roughness, in median gradients. A larger gradient counts as an edge.
 
 The second number is the minimum roughness of a patch, relative to the background. The third is the maximum mean
 gradient of a patch, edges included, relative to the background.
@@ -68,7 +68,7 @@ class Draft:
     Attributes
     ----------
     places : (H, W, 2) int32
-        Source pixel in the texture of each pixel; undefined in the holes.
+        Source pixel in the texture of each pixel. Values in the holes are undefined.
     known : (H, W) bool
         False for pixels in the holes.
     fixed : (H, W) bool
@@ -199,7 +199,7 @@ def thin_out(places: Bools) -> Bools:
 
 
 def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float64]:
-    """Return the mean of each window, stored at its first corner; 0 for windows that extend beyond the array."""
+    """Return the mean of each window, stored at its first corner, or 0 if the window extends beyond the array."""
     total = np.pad(np.asarray(values, np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     out = np.zeros(values.shape)
     means = (total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]) / side**2

@@ -25,7 +25,7 @@ __all__ = ["Light", "measure_light"]
 WIDE = 0.75
 """Standard deviation of the low-pass filter that separates light from texture, in spacings."""
 UNEVEN = 1.2
-"""Minimum ratio of variation, low frequencies to the rest, of an unevenly lit background.
+"""Minimum ratio of low-frequency variation to other variation in an unevenly lit background.
 
 The ratio is up to 0.8 for rust and stains, 0.3 for woven cloth, and at least 1.6 for photographs lit from one side.
 """
@@ -89,7 +89,7 @@ class Light:
 
 
 def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light | None:
-    """Measure the light on a texture's background; return None if it is even, or if the values are not colours.
+    """Measure the light on a texture's background. Return None if it is even, or if the values are not colours.
 
     Parameters
     ----------

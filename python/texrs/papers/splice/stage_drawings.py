@@ -93,7 +93,7 @@ def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) ->
 
 
 def draw_outlines(image: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
-    """Return an image with the outlines of labelled regions drawn over it; label 0 is not drawn."""
+    """Return an image with the outlines of labelled regions drawn over it. Label 0 does not have an outline."""
     out = image.copy()
     out[mark_outlines(labels)] = colour
     return out

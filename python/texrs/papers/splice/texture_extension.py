@@ -127,7 +127,7 @@ def extend(
 
 @remember(4)
 def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension | None:
-    """Cover an output with separate elements in their own arrangement; return None if it is not much larger."""
+    """Cover an output with separate elements in their own arrangement. Return None if the output is not much larger."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
     parts, shape = split_foreground(entry), entry.mask.shape
     radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / np.pi)
@@ -177,7 +177,7 @@ def _as_pair(place: NDArray[np.intp]) -> tuple[int, int]:
 
 @remember(64)
 def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
-    """Return the continued layout of a texture; if ``beyond`` is True, it may be reflected outside the image."""
+    """Return the continued layout of a texture. If ``beyond`` is True, it may be reflected outside the image."""
     return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
 
 

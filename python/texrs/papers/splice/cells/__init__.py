@@ -171,7 +171,7 @@ def _list_shown(wanted: Tessellation) -> NDArray[np.intp]:
 
 
 def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.float64]:
-    """Return the centre of each cell in the output, according to the source map; NaN if it is not visible."""
+    """Return the centre of each cell in the output, according to the source map, or NaN for invisible cells."""
     shape = joined.chart.shape
     chart = joined.chart.ravel()
     pixel = joined.pixel.ravel()

@@ -69,7 +69,7 @@ class Charts:
     corner, sides : (cells, 2) int
         First row and column of each box in the output, and its number of rows and columns.
     depth : (n,) float32
-        Depth of each pixel inside the target, in pixels; negative outside.
+        Depth of each pixel inside the target, in pixels. Pixels outside have a negative depth.
     places : (n, 2) float32
         Source position in A of each pixel.
 
@@ -156,7 +156,7 @@ def _draw(
 def _choose(
     cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist, unit: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Match the outlines of all cells on the shortlists; return source, turn, scale and outline of the best cells."""
+    """Match the outlines of all cells on the shortlists. Return source, turn, scale and outline of the best cells."""
     count, k = choices.source.shape
     source, turn, scale = (x.reshape(-1) for x in (choices.source, choices.turn, choices.scale))
     angle = np.radians(turn)
@@ -269,7 +269,7 @@ def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: flo
 
 
 def _measure_depth(labels: Labels, number: int, box: tuple[slice, ...], pad: int, smooth: float) -> NDArray[np.float64]:
-    """Return the smoothed signed distance to the outline of one label, over its box and a margin; positive inside."""
+    """Return the smoothed signed distance to a label's outline, positive inside, over the label's box and a margin."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     inside = np.pad(labels[box] == number, pad)

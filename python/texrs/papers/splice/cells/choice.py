@@ -134,7 +134,7 @@ def _compare(
 
 
 def list_usable(cells: Cells) -> NDArray[np.intp]:
-    """Return the indices of usable cells: complete and certain ones, or others if these are few."""
+    """Return the indices of complete and certain cells. If there are too few, also use other cells."""
     usual = cells.size**2
     fair = cells.area >= SMALL * usual
     certain = cells.certain >= TRUSTED

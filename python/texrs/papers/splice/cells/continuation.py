@@ -205,7 +205,7 @@ def _enclose(drawn: Floats, unit: float) -> Labels:
 
 
 def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> Labels:
-    """Label the cells that are mostly visible in a quilt, each completed, and the free areas between them.
+    """Label the cells that are mostly visible in a quilt and complete them. Also label the free areas between them.
 
     Parameters
     ----------

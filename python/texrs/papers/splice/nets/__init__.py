@@ -206,7 +206,10 @@ def _report(
 
 
 def _find_places(a: ElementAnalysis, laid: PlacedKnots, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
-    """Return the position of each knot in the output, according to the source map; NaN if it is not visible."""
+    """Return the position of each knot in the output, according to the source map.
+
+    Invisible knots have the position NaN.
+    """
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])
     pixel = np.rint(found)

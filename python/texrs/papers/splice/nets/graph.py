@@ -19,8 +19,7 @@ A tolerance is needed because lattices have many knots on one circle.
 FAR = 1.0
 """Maximum distance from a knot in the features, in spacings. Larger distances are set to it."""
 ASIDE = 0.5
-"""Maximum distance from a line in the features, in spacings. The direction of a line has no weight at this distance.
-"""
+"""Maximum distance from a line in the features, in spacings. The direction of a line has no weight at this distance."""
 DENSE = 1.0
 """Distance between the sample points on a line, in pixels. They are used to find the nearest line."""
 
@@ -52,9 +51,9 @@ def join_knots(points: Points) -> NDArray[np.intp]:
 def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floats:
     """Return four features (rows, columns, 4) that describe each pixel's place in a net.
 
-    The first two are the distances to the nearest knot and the nearest line, in half spacings. The others are the
-    cosine and sine of twice that line's angle, because a line has no forward end. Their weight decreases with the
-    distance from the line.
+    The first two features are the distances to the nearest knot and the nearest line, in half spacings. The other two
+    are the cosine and sine of twice that line's angle, because a line has no forward end. Their weight decreases with
+    the distance from the line.
     """
     from scipy.spatial import cKDTree
 

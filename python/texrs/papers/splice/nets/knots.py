@@ -211,7 +211,7 @@ def judge_places(
     step: int,
     corners: NDArray[np.intp],
 ) -> Floats:
-    """Return the cost of placing each of some pixels of A (n, 2) at the target; infinite if it is not possible.
+    """Return the costs of placing pixels (n, 2) of A at the target. The cost is infinite for impossible places.
 
     ``described``, (h, w, 4 + C), contains the features of A in its net, and its colours. Only every ``step``-th pixel
     is compared along each axis.
