@@ -1,5 +1,6 @@
-//! Fuzzes exemplar analysis, and coordinates that are initialised, corrected and upsampled.
-//! Coordinates must always be inside the exemplar, and held points must keep theirs.
+//! Fuzzes the analysis of exemplars, and the initialisation, correction and upsampling of
+//! coordinates. Initialised and corrected coordinates must be inside the exemplar, and held points
+//! must keep their coordinates.
 
 #![no_main]
 
@@ -24,8 +25,8 @@ fn frame<const D: usize>(draw: &mut Draw<'_>) -> Frame<D> {
 
 fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     let (wrap, channels) = (draw.flags(), draw.within(0..=4));
-    // The time of the analysis grows with the square of the window size. Wide windows, of up to 343
-    // values for each channel, are therefore rare.
+    // The time of the analysis grows with the square of the number of values in a window. Windows
+    // with up to 343 values for each channel are therefore rare.
     let widest = if draw.seldom(32) { 3 } else { 4 - D };
     let radius = draw.within(0..=if channels > 1 { widest.min(2) } else { widest });
     let exemplar = Grid::new(draw.shape::<D>(1..=longest), wrap).unwrap();

@@ -1,5 +1,5 @@
-//! Fuzzes the lookup of exemplars. Results are within the range of the samples, and equal the
-//! samples at whole coordinates.
+//! Fuzzes the interpolation of exemplars. Results must be within the range of the samples, and must
+//! equal the samples at integer coordinates.
 
 #![no_main]
 
@@ -84,7 +84,7 @@ fn check<T: Element + Debug + PartialOrd, const D: usize>(
             let most = (0..grids[e].len())
                 .map(of)
                 .fold(of(0), |m, x| if x > m { x } else { m });
-            // Weights that sum to 1 may exceed the range by rounding.
+            // Rounding errors may take a weighted mean slightly out of the range of the samples.
             let slack = 1e-6 * most.to_f64().abs().max(least.to_f64().abs());
             assert!(
                 value.to_f64() >= least.to_f64() - slack && value.to_f64() <= most.to_f64() + slack

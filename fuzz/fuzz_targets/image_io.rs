@@ -1,5 +1,5 @@
-//! Fuzzes the readers of image files with arbitrary bytes, and with written files that are damaged
-//! in a few places.
+//! Fuzzes the readers of image files with arbitrary bytes, and with valid files that are damaged at
+//! a few positions.
 
 #![no_main]
 
@@ -25,8 +25,8 @@ fn read(file: &[u8], limit: u64) -> Option<Decoded> {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    // Most inputs of the corpus are plain files. Their first bytes cannot occur in the other
-    // inputs.
+    // Most inputs of the corpus are image files, which are recognised by their first bytes. All
+    // other inputs are bytes that arguments are drawn from.
     if Format::of_content(bytes).is_some() {
         read(bytes, 1 << 12);
         read(bytes, 16);

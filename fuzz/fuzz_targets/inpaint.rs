@@ -1,11 +1,11 @@
-//! Fuzzes the filling of holes. At the end all pixels are known, kept pixels have not changed, and
-//! every filled pixel is one of the exemplars.
+//! Fuzzes the filling of holes. Afterwards all pixels must be known, kept pixels must be unchanged,
+//! and each filled pixel must be a copy of a pixel of an exemplar.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::grid::Grid;
+use texrs::inpaint::{Canvas, Options, inpaint};
 use texrs::patch_search::{Exemplar, Index, Pick};
 use texrs_fuzz::{Draw, agreed, speaks};
 
@@ -69,7 +69,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Some((filled, all, done)) = found else {
         return;
     };
-    // Compare each pixel with the patch that its label names.
+    // Compare each filled pixel with the exemplar pixel in the patch that its label refers to.
     assert!(all.iter().all(|k| *k));
     for p in 0..n {
         let pixel = p * channels..(p + 1) * channels;

@@ -1,5 +1,5 @@
-//! Fuzzes binary labels of minimum energy and cheapest seams as shortest paths. Both are compared
-//! with maximum flows.
+//! Fuzzes binary labels of minimum energy, and minimum-cost seams found as shortest paths. No
+//! change of a single label may lower the energy, and seams must cost as much as minimum cuts.
 
 #![no_main]
 
@@ -11,8 +11,8 @@ use texrs::seam::planar::ring::{Ring, Side, least_ring};
 use texrs::seam::planar::{Strip, least_seam};
 use texrs_fuzz::{Draw, agreed, near};
 
-/// Returns the sum of the costs of the pairs with different labels. The cost depends on the label
-/// of the first point.
+/// Returns the sum of `cost` over all pairs of neighbours with different labels. The cost of a pair
+/// depends on the label of its first point.
 fn parted<const D: usize, T>(
     grid: &Grid<D>,
     labels: &[bool],
@@ -62,8 +62,8 @@ fn energy<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         })
     };
     assert!(near(of(&found.labels), found.energy, 1e-9));
-    // Costs are rounded to steps of 2^-25 of the largest pairwise cost, or of the largest unary
-    // cost without pairwise costs.
+    // Costs are rounded to steps of 2^-25 of the largest pairwise cost or, without pairwise costs,
+    // of the largest unary cost.
     let costs = pairs.iter().flatten().flatten().copied();
     let own = unary
         .as_flattened()
@@ -132,7 +132,7 @@ fn strip(draw: &mut Draw<'_>) {
 fn ring(draw: &mut Draw<'_>) {
     let (rows, columns) = (draw.within(1..=12), draw.within(1..=12));
     let n = rows * columns;
-    // Mostly a core in the middle and a rim outside, with random changes.
+    // Start from a core in the middle and a rim along the border, then change a few random pixels.
     let middle = [rows / 2, columns / 2];
     let reach = draw.within(0..=3);
     let mut sides: Vec<Side> = (0..n)
@@ -192,7 +192,7 @@ fn ring(draw: &mut Draw<'_>) {
     let sum = parted(&grid, &inside, |axis, p, _| i64::from(pairs[axis][p]));
     let flow = min_cut(&graph, &Default::default()).unwrap();
     assert_eq!(sum, flow.value);
-    // Both promise the innermost solution.
+    // If several cuts are minimal, both solvers must return the innermost one.
     assert_eq!(inside, flow.sink);
 }
 

@@ -8,7 +8,7 @@ use texrs::grid::Grid;
 use texrs::seam::maxflow::{Graph, Solver, min_cut};
 use texrs_fuzz::{Draw, agreed};
 
-/// Returns the cost of labels.
+/// Returns the cost of the cut whose points on the sink side are those where `sink` is true.
 fn cost<const D: usize>(graph: &Graph<'_, D>, sink: impl Fn(usize) -> bool) -> i64 {
     let grid = graph.grid;
     let mut sum = 0;

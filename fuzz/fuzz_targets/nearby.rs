@@ -27,7 +27,7 @@ fn distances(draw: &mut Draw<'_>) {
             shape: draw.shape(0..=10),
         })
         .collect();
-    // Compare each distance with the minimum over all pixels across the outline.
+    // Compare each distance with the minimum over all pixels on the other side of the outline.
     let Some(found) = agreed(|monitor| outlines(&labels, shape, &pieces, monitor)) else {
         return;
     };
@@ -85,7 +85,7 @@ fn summed(draw: &mut Draw<'_>) {
     if !values.iter().all(|x| x.abs() <= 1.0) {
         return;
     }
-    // Compare each sum with the sum over all points, if values are moderate.
+    // Compare each sum with a direct computation over all points.
     let weight = |a: i64, b: i64, size: usize| -> f64 {
         let turns = if cyclic { -14..=14 } else { 0..=0 };
         let far = turns.map(|turn| (a - b + turn * size as i64).unsigned_abs() as usize);

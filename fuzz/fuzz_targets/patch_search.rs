@@ -1,4 +1,5 @@
-//! Fuzzes the search for best matches. The result must equal that of scoring every position.
+//! Fuzzes the search for best matches. The result must be the same as if every position were
+//! scored.
 
 #![no_main]
 
@@ -74,7 +75,8 @@ fuzz_target!(|bytes: &[u8]| {
         }
         let scored = index.best_among(&query, &all, &pick).unwrap();
         assert_eq!(format!("{best:?}"), format!("{scored:?}"));
-        let good = agreed(|monitor| index.good(&query, &pick, monitor)).expect("as the best ones");
+        let good = agreed(|monitor| index.good(&query, &pick, monitor))
+            .expect("good matches if there are best ones");
         assert!(good.len() <= pick.count && good.is_empty() == best.is_empty());
         for m in &good {
             assert!(m.cost >= best[0].cost && all.contains(&[m.exemplar, m.row, m.column]));

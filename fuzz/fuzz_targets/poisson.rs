@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 use texrs::poisson::{Domain, Edge, Problem, solve};
 use texrs_fuzz::{Draw, agreed};
 
-/// Returns the sum that is minimised.
+/// Returns the sum of squares that the solver minimises.
 fn cost(problem: &Problem<'_>, values: &[f32]) -> f64 {
     let Domain {
         shape: [rows, columns, channels],

@@ -1,5 +1,5 @@
-//! Fuzzes seams between two images. Tied pixels must keep their side. A reused workspace must find
-//! the same cut, and a strip must cost as much as the general cut.
+//! Fuzzes seams between two images. Pixels that are tied to an image must show it. A reused
+//! workspace must find the same cut, and a strip must cost as much as the general cut.
 
 #![no_main]
 
@@ -43,7 +43,7 @@ fn stitched<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         draw.flag()
             .then(|| core.iter().zip(mask).map(of).collect::<Vec<bool>>())
     });
-    // Pixels that are tied to both images are an error, so this is tried rarely.
+    // Pixels that are tied to both images are an error, so give both cores only rarely.
     let core_a = if draw.seldom(8) {
         core_a
     } else {
@@ -89,7 +89,8 @@ fn stitched<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     assert_eq!(stitcher.cut(&overlap, &Default::default()).unwrap(), found);
 }
 
-/// A strip equals a stitch whose first line is tied to A and whose last line is tied to B.
+/// Fuzzes strips. A strip must cost as much as the general cut if the first line is tied to A and
+/// the last line to B.
 fn pasted(draw: &mut Draw<'_>) {
     let shape = draw.shape::<2>(1..=12);
     let (n, channels, axis) = (shape[0] * shape[1], draw.within(1..=3), draw.within(0..=1));

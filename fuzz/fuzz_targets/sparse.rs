@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut draw = Draw::new(bytes);
     let size = draw.within(0..=24);
     let (mut starts, mut rows, mut values) = (vec![0u32], Vec::new(), Vec::new());
-    // The diagonals exceed the sums of their rows by the screening.
+    // Each diagonal entry exceeds the sum of the other magnitudes in its row by `screening`.
     let screening = [1e-6, 1.0, 0.0, -1.0][draw.within(0..=3)];
     let mut weights = vec![screening; size];
     let sparse = draw.within(1..=6) as u8;
@@ -41,7 +41,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         starts.push(rows.len() as u32);
     }
-    // Include a few indices that are invalid in any matrix.
+    // Sometimes replace a few indices by arbitrary ones, so that the matrix is mostly invalid.
     if draw.seldom(8) {
         for _ in 0..draw.within(1..=3) {
             let list = if draw.flag() { &mut starts } else { &mut rows };
@@ -81,7 +81,8 @@ fuzz_target!(|bytes: &[u8]| {
     let Some(solved) = found else {
         return;
     };
-    // Multiply by definition, with a tolerance for the condition of the matrix.
+    // Multiply the matrix by the solution directly. The tolerance grows with the largest entry of
+    // the matrix and with the largest unknown.
     let most = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     for (x, b) in solved.chunks_exact(size).zip(sides.chunks_exact(size)) {
         let mut product = vec![0.0; size];

@@ -1,5 +1,5 @@
-//! Fuzzes the stitcher with any source, frames and options. Every point must show a patch, and held
-//! points must not change.
+//! Fuzzes the stitcher with arbitrary sources, frames and options. Every point that is not held
+//! must show a patch, and held points that are not loose must not change.
 
 #![no_main]
 
@@ -76,7 +76,7 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         Err(error) => return speaks(&error),
     };
     let n = region.grid.len();
-    // Use a few kinds of frames, which are realistic and need few bytes.
+    // Use at most three different frames: this is realistic, and needs only few bytes of the input.
     let kinds: Vec<Frame<D>> = (0..draw.within(1..=3)).map(|_| frame(draw)).collect();
     let own: Vec<Frame<D>> = draw
         .numbers(n, kinds.len() as u32)
@@ -134,11 +134,11 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
             of_patch || held.get(p) == Some(&true),
             "point {p} shows nothing"
         );
-        assert!(!(stays && of_patch), "point {p} was to stay");
+        assert!(!(stays && of_patch), "held point {p} changed");
     }
 }
 
-/// Fuzzes patches that are pasted without a frame.
+/// Fuzzes `Samples`, whose unwarped patches are judged and cut into a window.
 fn pasted(draw: &mut Draw<'_>) {
     let (count, channels) = (draw.within(0..=40), draw.within(0..=4));
     let colours = draw.reals(count * channels);
@@ -152,7 +152,7 @@ fn pasted(draw: &mut Draw<'_>) {
     let most = count as u32 + u32::from(draw.seldom(16));
     let some = draw.mask(n);
     let sample = |draw: &mut Draw<'_>| -> Vec<u32> { draw.numbers(n, most).collect() };
-    // Some points show nothing yet.
+    // Points with the number `u32::MAX` do not show a sample yet.
     let shown: Vec<u32> = sample(draw)
         .iter()
         .zip(&some)
@@ -175,7 +175,7 @@ fn pasted(draw: &mut Draw<'_>) {
     };
     let patches: Vec<Vec<u32>> = (0..draw.within(1..=2)).map(|_| sample(draw)).collect();
     let views: Vec<&[u32]> = patches.iter().map(|p| &p[..]).collect();
-    // Judged values are numbers, and a cut respects mask and core.
+    // Judged values must not be NaN. A cut must take the whole core, and nothing outside the mask.
     if let Some(values) = agreed(|monitor| samples.judge(&pasting, &views, monitor)) {
         assert!(values.iter().all(|v| !v.is_nan()));
     }

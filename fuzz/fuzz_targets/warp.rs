@@ -1,4 +1,4 @@
-//! Fuzzes warps by meshes and by scattered points, and moved shapes, with any points.
+//! Fuzzes warps by meshes and by scattered points, and the motion of shapes, with arbitrary points.
 
 #![no_main]
 
@@ -7,8 +7,8 @@ use texrs::grid::Grid;
 use texrs::warp::{Mesh, Motion, Point, Shape, Warped, mesh, scattered};
 use texrs_fuzz::{Draw, agreed};
 
-/// Returns a coordinate, mostly near the canvas on a lattice of halves, so that points often
-/// coincide. Rarely it is arbitrary.
+/// Returns a coordinate. Most are multiples of 0.5 near the canvas, so that points often coincide,
+/// and a few are arbitrary.
 fn coordinate(draw: &mut Draw<'_>) -> f64 {
     match draw.within(0..=31) {
         0 => f64::from(draw.real()) * 1e9,
@@ -91,7 +91,7 @@ fn moved(draw: &mut Draw<'_>) {
         Ok(motion) => motion,
         Err(error) => return texrs_fuzz::speaks(&error),
     };
-    // The window is on the canvas, and the counts match the flags.
+    // The window must be inside the canvas, and the counts must match the flags.
     let canvas = draw.shape(1..=20);
     let Some(window) = motion.window(&shape, canvas) else {
         return;

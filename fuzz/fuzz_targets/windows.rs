@@ -1,5 +1,5 @@
-//! Fuzzes correlations, mean shifts and regions. Results must be within their ranges, and
-//! correlations and regions are compared with direct computations.
+//! Fuzzes correlations, mean shifts and regions. Correlations must equal direct computations, mean
+//! shifts must stay within the range of the image, and regions must be connected.
 
 #![no_main]
 
@@ -95,8 +95,8 @@ fn shifted(draw: &mut Draw<'_>) {
     }
 }
 
-/// Checks that regions are numbered by their first pixels, are connected, and have the minimum area
-/// unless there is only one.
+/// Checks that regions are numbered in the order of their first pixels, are connected, and have the
+/// minimum area unless there is only one.
 fn merged(draw: &mut Draw<'_>) {
     let shape = [draw.within(0..=12), draw.within(0..=12), draw.within(0..=4)];
     let image = draw.reals(shape.iter().product());
@@ -106,7 +106,8 @@ fn merged(draw: &mut Draw<'_>) {
         least: draw.within(0..=20),
         wrap: draw.flags(),
     };
-    let Some(found) = agreed(|monitor| regions::felzenszwalb(&image, shape, &options, monitor)) else {
+    let Some(found) = agreed(|monitor| regions::felzenszwalb(&image, shape, &options, monitor))
+    else {
         return;
     };
     let grid = Grid::new([shape[0], shape[1]], options.wrap).unwrap();
@@ -119,7 +120,7 @@ fn merged(draw: &mut Draw<'_>) {
         areas[label] += 1;
     }
     assert!(areas.len() == 1 || areas.iter().all(|&n| n >= options.least));
-    // Fill each region from its first pixel.
+    // Fill each region from its first pixel, to check that it is connected.
     let mut seen = vec![false; found.len()];
     for (first, &label) in found.iter().enumerate() {
         if seen[first] || found[..first].contains(&label) {

@@ -24,8 +24,8 @@ const ODD: [f32; 10] = [
     1e15,
 ];
 
-/// Values drawn from the bytes of an input. After the end of the bytes, all values are the smallest
-/// ones.
+/// Draws values from the bytes of an input. After the last byte, each value is the smallest of its
+/// range.
 pub struct Draw<'a>(Unstructured<'a>);
 
 impl<'a> Draw<'a> {
@@ -41,7 +41,7 @@ impl<'a> Draw<'a> {
         self.any()
     }
 
-    /// Returns true once in `n` draws.
+    /// Returns true about once in `n` draws.
     pub fn seldom(&mut self, n: u8) -> bool {
         self.any::<u8>() % n == n - 1
     }
@@ -59,7 +59,7 @@ impl<'a> Draw<'a> {
         std::array::from_fn(|_| self.flag())
     }
 
-    /// Returns a small region, around the origin or rarely anywhere.
+    /// Returns a small region near the origin, or rarely anywhere.
     ///
     /// # Errors
     /// The region is too far from the origin.
@@ -75,7 +75,7 @@ impl<'a> Draw<'a> {
         Region::new(grid, origin)
     }
 
-    /// Returns a value from 0 to 1, or rarely an odd value.
+    /// Returns a value from 0 to 1, or rarely one of `ODD`.
     pub fn real(&mut self) -> f32 {
         if self.seldom(32) {
             ODD[self.within(0..=ODD.len() - 1)]
@@ -84,15 +84,15 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// Returns values from 0 to 1 with few levels, from the bytes or from the noise of a seed. Few
-    /// levels cause many ties.
+    /// Returns `n` values from 0 to 1. The values have few levels, so that ties are frequent.
     pub fn values(&mut self, n: usize) -> Vec<f32> {
         let levels = [1u32, 2, 5, 255][self.within(0..=3)];
         let level = |x: u32| (x % (levels + 1)) as f32 / levels as f32;
         self.words(n).map(level).collect()
     }
 
-    /// Returns values like [`Self::values`], rarely with a few odd values.
+    /// Returns values like [`Self::values`]. Rarely, a few of them are replaced by values from
+    /// `ODD`.
     pub fn reals(&mut self, n: usize) -> Vec<f32> {
         let mut values = self.values(n);
         if n > 0 && self.seldom(16) {
@@ -103,18 +103,19 @@ impl<'a> Draw<'a> {
         values
     }
 
-    /// Returns flags. The fraction of set flags is 1/2, 1/8, 7/8 or 1.
+    /// Returns `n` flags. The fraction of set flags is 1/2, 1/8, 7/8 or 1.
     pub fn mask(&mut self, n: usize) -> Vec<bool> {
         let set = [128, 32, 224, 256][self.within(0..=3)];
         self.words(n).map(|x| x % 256 < set).collect()
     }
 
-    /// Returns numbers below `most`.
+    /// Returns `n` numbers below `most`.
     pub fn numbers(&mut self, n: usize, most: u32) -> impl Iterator<Item = u32> + use<'a> {
         self.words(n).map(move |x| x % most.max(1))
     }
 
-    /// Returns words from the bytes or from a seed, so that few bytes give many words.
+    /// Returns `n` words, either from the bytes of the input or from the noise of a seed. With a
+    /// seed, few bytes give many words.
     pub fn words(&mut self, n: usize) -> impl Iterator<Item = u32> + use<'a> {
         let words: Vec<u32> = if self.flag() {
             (0..n).map(|_| u32::from(self.any::<u8>())).collect()
@@ -157,13 +158,14 @@ pub fn agreed<T: Debug + Send>(work: impl Fn(&Monitor) -> Result<T> + Sync) -> O
     }
 }
 
-/// Checks that an error has a message with an argument, and that it is not a cancellation.
+/// Checks that an error has a message of several words, and that it is not a cancellation.
 pub fn speaks(error: &Error) {
     assert!(!matches!(error, Error::Cancelled(_)), "{error}");
     assert!(error.to_string().contains(' '), "{error:?}");
 }
 
-/// Whether two values are equal except for the rounding of sums in another order.
+/// Returns whether two values are equal, except for rounding errors of up to a fraction `share` of
+/// their magnitudes.
 pub fn near(a: f64, b: f64, share: f64) -> bool {
     a == b || (a - b).abs() <= share * (a.abs() + b.abs() + 1.0)
 }

@@ -1,5 +1,5 @@
-//! Similarity sets of an image and of a volume, and one pass of correction over the same number of
-//! points.
+//! Times the similarity sets of an image and of a volume, and one correction pass over a region of
+//! the same size.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::appearance::Appearance;

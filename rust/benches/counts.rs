@@ -1,4 +1,4 @@
-//! The hottest kernels, each run once on little data. The tool `.ci/counts` counts their
+//! Runs each of the hottest kernels once on little data. The tool `.ci/counts` counts their
 //! instructions.
 //!
 //! `counts NAME` runs one kernel. Only instructions within [`measured`] are counted, on one thread.
@@ -18,7 +18,7 @@ use texrs::regions;
 use texrs::seam::stitch::{Overlap, Stitcher};
 use texrs::stitcher::{self, Adjacency, Elements, Given, Source, Weights};
 
-/// An image of three channels: waves with noise.
+/// Returns an image with three channels that shows waves with noise.
 fn image(side: usize, layer: u32) -> Vec<f32> {
     let noise = Noise::new(1);
     (0..side * side * 3)

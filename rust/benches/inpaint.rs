@@ -1,4 +1,5 @@
-//! Filling a hole of a quarter of the side, with pools of one and two threads.
+//! Times the filling of a hole whose sides are a quarter of the image's, with one and with two
+//! threads.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::grid::Grid;
@@ -41,7 +42,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             separation: 4,
             ratio: 3.0,
         };
-        // Compare the default method with the literal one.
+        // Compare the default method with the method of the paper.
         for (name, paper) in [("inwards", false), ("paper", true)] {
             let options = Options {
                 patch: [patch; 2],

@@ -1,4 +1,5 @@
-//! The root of the criterion benchmarks. Each kernel has a group, and sizes and pools are ids.
+//! Root of the criterion benchmarks. Each kernel has a benchmark group, whose ids contain the sizes
+//! and the number of threads.
 
 mod coherence;
 mod inpaint;

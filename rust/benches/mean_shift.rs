@@ -1,4 +1,4 @@
-//! Mean-shift filtering of a noisy wave, with radii that segmentation uses.
+//! Times mean-shift filtering of a noisy wave, with the radii that segmentation uses.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -1,4 +1,5 @@
-//! Correlation of a template with an image of eight channels, whose spectra are already computed.
+//! Times the correlation of a template with an image of eight channels, whose spectra are already
+//! computed.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::hash::Noise;

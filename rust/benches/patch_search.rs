@@ -1,4 +1,4 @@
-//! Search for patches of the sizes that filling of holes uses.
+//! Times the search for patches, with the patch sizes that the filling of holes uses.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;
@@ -27,7 +27,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             weight: &weight,
             shape: [patch; 2],
         };
-        // Also time five matches, because each further match needs another search of the maps.
+        // Also time five matches, because each further match needs another search of the cost maps.
         for (count, threads) in [(1, 1), (1, 2), (5, 1)] {
             let pick = Pick {
                 count,

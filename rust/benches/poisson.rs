@@ -1,4 +1,5 @@
-//! The Poisson solver on rectangles with every boundary condition, and on a disc under a mask.
+//! Times the Poisson solver on rectangles with every boundary condition, and on a disc given by a
+//! mask.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::{self, Monitor};
@@ -18,7 +19,7 @@ pub(crate) fn bench(c: &mut Criterion) {
         let disc: Vec<bool> = (0..side * side)
             .map(|i| ((i / side) as f32 - centre).hypot((i % side) as f32 - centre) < 0.8 * centre)
             .collect();
-        // The first three are solved directly, the disc by multigrid.
+        // The first three problems are solved directly, and the disc by multigrid.
         for (name, edge, mask) in [
             ("fixed", Edge::Fixed, None),
             ("wrap", Edge::Wrap, None),

@@ -1,4 +1,4 @@
-//! Segmentation of a noisy wave, with the usual parameters.
+//! Times the segmentation of a noisy wave, with the usual parameters.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::hash::Noise;

@@ -7,7 +7,7 @@ use texrs::seam::labels::{Energy, least_energy};
 use texrs::seam::stitch::{Overlap, Stitcher};
 use texrs::seam::strip::{self, Pasted};
 
-/// RGB noise of several octaves, which is as rough as a texture and needs no file.
+/// Returns RGB noise with several octaves, which is as rough as a texture and needs no file.
 fn image(side: usize, layer: u32) -> Vec<f32> {
     let noise = Noise::new(1);
     (0..side * side * 3)
@@ -42,7 +42,8 @@ pub(crate) fn bench(c: &mut Criterion) {
                 bencher.iter(|| strip::cut(&pasted, &monitor).unwrap());
             });
         }
-        // A patch with a core that must stay and a free ring.
+        // The second image is a patch. Its core must be kept, and the seam runs through the ring
+        // around the core.
         let grid = Grid::new([side, side], [false; 2]).unwrap();
         let inset = |margin: usize| -> Vec<bool> {
             (0..side * side)

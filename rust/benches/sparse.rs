@@ -1,4 +1,5 @@
-//! The screened Laplacian of a grid, factored and solved for two right-hand sides.
+//! Times the factorisation of the screened Laplacian of a grid, and its solution for two right-hand
+//! sides.
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::Monitor;

@@ -1,4 +1,4 @@
-//! The stitcher on images and volumes, with and without a field.
+//! Times the stitcher on images and volumes, with and without a frame field.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::fixed::{Frame, Frames, ONE, identity};
@@ -27,7 +27,7 @@ const OPTIONS: Options = Options {
     seed: 1,
 };
 
-/// Balls on a lattice, each with its own shade.
+/// Returns a source that shows balls on a lattice, each with its own shade.
 fn balls<const D: usize>(side: usize) -> Source<D> {
     let grid = Grid::new([side; D], [false; D]).unwrap();
     let (mut colours, mut labels, mut depth) = (Vec::new(), Vec::new(), Vec::new());
@@ -61,7 +61,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
     group.sample_size(10);
     let source = balls::<D>(64);
     let region = Region::new(Grid::new([side; D], [false; D]).unwrap(), [0; D]).unwrap();
-    // The field rotates the texture along the first axis.
+    // The field rotates the texture by an angle that grows along the first axis.
     let turned: Vec<Frame<D>> = (0..region.grid.len())
         .map(|p| {
             let angle = region.grid.point(p)[0] as f64 / side as f64;

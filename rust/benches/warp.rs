@@ -1,4 +1,4 @@
-//! Warps of a dense mesh and of scattered points along a wave.
+//! Times warps of a dense mesh and of scattered points along a wave.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::par::{self, Monitor};

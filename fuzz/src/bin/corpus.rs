@@ -18,7 +18,8 @@ fn bytes(seed: u64, n: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Writes small files of all supported kinds, half of each file, and headers of the other formats.
+/// Writes small files in all supported formats, the first half of each file, and the headers of two
+/// more formats.
 fn images(folder: &Path) -> io::Result<()> {
     for format in [Format::Png, Format::Tiff, Format::Hdr] {
         for sample in [Sample::U8, Sample::U16, Sample::F32] {
@@ -26,7 +27,8 @@ fn images(folder: &Path) -> io::Result<()> {
                 for side in [1, 3, 17] {
                     let pixels = bytes(side as u64, side * side * channels * sample.size());
                     let shape = [side, side, channels];
-                    // Some formats do not support some samples or channels.
+                    // Skip types of samples and numbers of channels that the format does not
+                    // support.
                     let Ok(file) = encode("corpus", format, sample, shape, &pixels) else {
                         continue;
                     };
