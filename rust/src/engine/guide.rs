@@ -4,16 +4,16 @@ use crate::engine::appearance::{CHANNELS, Colour};
 use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
-/// A draw chooses among at least 1 / SHARE of the samples. Their first values are the nearest to the wanted value.
+/// A draw chooses among at least 1 / SHARE of the samples, those whose first values are nearest to the wanted value.
 const SHARE: usize = 25;
-/// Maximum difference between the first value of a sample and the wanted value. Samples within it count as equally
+/// Maximum difference between the first value of a sample and the wanted value for which samples count as equally
 /// good.
 const ALIKE: i32 = 48;
-/// Cost of two unrelated windows, in the units of vectors. The stitcher divides the costs of a guide by it.
+/// Cost of two unrelated windows, in the units of appearance vectors. The stitcher divides the costs of a guide by it.
 pub(crate) const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
-/// Weight of an excess (a first value above the wanted one) that equals the weight of a deficit.
+/// Weight of an excess, a first value above the wanted one, that equals the weight of a deficit.
 const EVEN: i64 = 256;
-/// Number of values that 12 bits can have.
+/// Number of different values of a 12-bit integer.
 const VALUES: i32 = 4096;
 
 /// Values of the exemplar's samples, and wanted values at the points of the output. Both have 12 bits.
@@ -21,12 +21,12 @@ const VALUES: i32 = 4096;
 pub struct Guide<'a> {
     exemplar: &'a [Colour],
     output: Wanted<'a>,
-    /// Cost of a squared difference of 1, in units of 1 / 256; 0 at points without a constraint. One for all points,
-    /// or one for each.
+    /// Cost of a squared difference of 1, in units of 1 / 256, and 0 at points without a constraint. There is one
+    /// weight for all points, or one for each point.
     weight: &'a [u16],
     /// Samples that may be drawn, in ascending order of their first value. Empty if draws ignore the guide.
     order: &'a [u32],
-    /// For each first value, the number of samples in `order` that have a lower one.
+    /// For each possible first value, the number of samples in `order` that have a lower one.
     before: Vec<u32>,
     /// Weight of an excess, in units of 1 / 256 of the weight of a deficit.
     excess: i64,
@@ -36,13 +36,14 @@ pub struct Guide<'a> {
 #[derive(Debug, Clone, Copy)]
 enum Wanted<'a> {
     All(&'a [Colour]),
-    /// Only the first values; the others are zero.
+    /// Only the first of the four values. The others are zero.
     First(&'a [i16]),
 }
 
 impl<'a> Guide<'a> {
-    /// Creates a guide for an exemplar of `samples` and an output of `points`. Each sample has four values. Each point
-    /// has four or one, and weights are one for all points or one for each.
+    /// Creates a guide for an exemplar with `samples` samples and an output with `points` points. The exemplar has
+    /// four values for each sample. The output has four values or one for each point. There is one weight for all
+    /// points, or one for each.
     pub fn new(
         exemplar: &'a [Colour],
         output: &'a [i16],
@@ -79,7 +80,7 @@ impl<'a> Guide<'a> {
         })
     }
 
-    /// Makes draws prefer samples near the wanted value. `order` contains the samples that may be drawn, sorted by
+    /// Makes `near` prefer samples near the wanted value. `order` contains the samples that may be drawn, sorted by
     /// their first value.
     pub fn ordered(mut self, order: &'a [u32]) -> Result<Self> {
         let value = |k: &u32| self.exemplar.get(*k as usize).map(|v| i32::from(v[0]));
@@ -90,7 +91,7 @@ impl<'a> Guide<'a> {
             ));
         }
         if !order.is_empty() {
-            // Count the samples by value, then sum the counts up.
+            // Count the samples by value, then accumulate the counts.
             self.before = vec![0; VALUES as usize + 1];
             for k in order {
                 let v = i32::from(self.exemplar[*k as usize][0]) + VALUES / 2;
@@ -120,7 +121,7 @@ impl<'a> Guide<'a> {
         let wanted = i32::from(self.wanted(point)[0]) + VALUES / 2;
         let before = |v: i32| self.before[v.clamp(0, VALUES) as usize] as usize;
         let (middle, half) = (before(wanted), (self.order.len() / SHARE).max(12) / 2);
-        // Draw from all samples that are good enough, or from the nearest ones if these are few.
+        // Draw from all samples that are good enough. If these are few, draw from the nearest ones.
         let low = before(wanted - ALIKE).min(middle.saturating_sub(half));
         let high = before(wanted + ALIKE + 1)
             .max(middle + half)
@@ -181,7 +182,7 @@ impl<'a> Guide<'a> {
         sum
     }
 
-    /// Returns whether an excess has another weight than a deficit.
+    /// Returns whether an excess has a different weight from a deficit.
     pub(crate) fn is_lopsided(&self) -> bool {
         self.excess != EVEN
     }

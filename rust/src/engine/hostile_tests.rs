@@ -1,4 +1,5 @@
-//! Extreme arguments: for all numbers, the engine returns places or an error, without a panic or an overflow.
+//! Tests with extreme arguments. For any numbers, the engine must return places or an error, without a panic or an
+//! overflow.
 
 use proptest::prelude::*;
 
@@ -42,12 +43,12 @@ fn exemplar<const D: usize>(wrap: bool) -> Appearance<D> {
     Appearance::new(&colours, grid, 1, 1).unwrap()
 }
 
-/// Draws mostly usual numbers, sometimes a huge one.
+/// Draws mostly usual numbers, and sometimes a huge one.
 fn count(usual: std::ops::Range<usize>) -> impl Strategy<Value = usize> {
     prop_oneof![6 => usual, 1 => prop::sample::select(HUGE.to_vec())]
 }
 
-/// Draws mostly usual costs, sometimes an extreme one.
+/// Draws mostly usual costs, and sometimes an extreme one.
 fn real() -> impl Strategy<Value = f64> {
     prop_oneof![6 => 0.0..2.0, 1 => prop::sample::select(ODD.to_vec())]
 }
@@ -74,7 +75,7 @@ fn numbers() -> impl Strategy<Value = Numbers> {
     )
 }
 
-/// Creates a region from numbers.
+/// Creates a region from drawn numbers.
 fn region<const D: usize>(numbers: &Numbers) -> Result<Region<D>> {
     let (shape, origin, wrap) = numbers;
     let grid = Grid::new(
@@ -82,7 +83,7 @@ fn region<const D: usize>(numbers: &Numbers) -> Result<Region<D>> {
         std::array::from_fn(|a| wrap[a]),
     )?;
     let region = Region::new(grid, std::array::from_fn(|a| origin[a]))?;
-    // Skip large regions. They are valid, but would take long.
+    // Skip large regions, which are valid but would take long.
     if region.grid.len() > 4096 {
         return Err(Error::value("shape", "not tried"));
     }
@@ -215,7 +216,7 @@ proptest! {
         let options = blocks::Options {
             cell, rounds: rounds.min(1 << 20), candidates, contrast, continuation, repetition, seed, margin,
         };
-        // Skip valid options that would take long; only errors matter there.
+        // Skip valid options that would take long. Still try larger numbers, which must give an error at once.
         if rounds.saturating_mul(candidates) < 100 || rounds > 1 << 15 || candidates > 1 << 15 {
             let _ = start::<2>(&place, &options, wrap, plain);
             let _ = start::<3>(&place, &options, wrap, plain);

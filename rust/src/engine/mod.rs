@@ -1,5 +1,5 @@
-//! The inner loops of coarse-to-fine synthesis. Each works on one resolution of an exemplar and an output, in fixed
-//! point.
+//! The inner loops of coarse-to-fine synthesis. Each works in fixed-point arithmetic on one resolution of an exemplar
+//! and of an output.
 
 pub mod appearance;
 pub mod blocks;

@@ -12,9 +12,9 @@ const CHUNK: usize = 4096;
 /// Computes the places S of a region from the places S' at half the resolution. With r = p mod 2 - 1/2, S(p) = 2 S'(p
 /// / 2) + 1/2 + J r.
 ///
-/// The terms 1/2 are needed because a parent is in the middle between its children. With identity frames, whole
-/// coordinates remain whole. The parents must include p / 2, rounded down, for every p of the world. Along periodic
-/// axes of odd length, the last parent has three children.
+/// The terms 1/2 are needed because a parent is midway between its children. With identity frames, integer coordinates
+/// remain integers. The parents must include p / 2, rounded down, for every p of the region. Along periodic axes of
+/// odd length, the last parent has three children.
 ///
 /// Reference: Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005, section 3.1.
 pub fn upsample<const D: usize>(
@@ -24,7 +24,7 @@ pub fn upsample<const D: usize>(
     frames: Frames<'_, D>,
 ) -> Result<Vec<Place<D>>> {
     let (coarse, fine) = (from.grid.shape(), to.grid.shape());
-    // Missing parents are an error, because they would change the result.
+    // Return an error if parents are missing, because clamped ones would change the result.
     for axis in 0..D {
         let first = to.origin[axis].div_euclid(2) - from.origin[axis];
         let last = (to.origin[axis] + fine[axis] as i32 - 1).div_euclid(2) - from.origin[axis];
@@ -49,7 +49,7 @@ pub fn upsample<const D: usize>(
                 let at =
                     (world[axis].div_euclid(2) - from.origin[axis]).min(coarse[axis] as i32 - 1);
                 parent[axis] = at as usize;
-                // Twice the step from the middle between the first two children.
+                // This is twice the step from the middle between the first two children to the point.
                 twice[axis] = 2 * (world[axis] - 2 * (at + from.origin[axis])) - 1;
             }
             let middle =

@@ -45,7 +45,7 @@ struct Line(Feature);
 /// A colour, scaled so that the colours of the exemplar fill 12 bits.
 pub type Colour = [i16; CHANNELS];
 
-/// Standard deviation of windows in an appearance vector.
+/// Standard deviation of the windows, in units of an appearance vector.
 const SCALE: i32 = 512;
 /// Largest signed 12-bit integer.
 const TOP: f32 = 2047.0;
@@ -57,10 +57,10 @@ const SAMPLES: usize = 6000;
 const FLAT: f64 = 1e-3;
 /// Maximum number of values in a window, because the components are computed from a square matrix of this side.
 const LONGEST: usize = 2048;
-/// Number of 16-bit values in a register.
+/// Number of 16-bit values in a SIMD register.
 const LANES: usize = 16;
-/// Maximum difference of two places in the same patch of the exemplar, because rounding moves each by up to half a
-/// sample.
+/// Maximum difference along an axis between two places that count as parts of the same patch of the exemplar. Rounding
+/// moves each place by up to half a sample.
 const SAME: i32 = ONE * 3 / 4;
 /// Number of points in a task.
 const CHUNK: usize = 1024;
@@ -112,7 +112,7 @@ impl<const D: usize> Appearance<D> {
             return Err(Error::value(
                 "radius",
                 format!(
-                    "must be at least 1 with windows of at most {LONGEST} values, got {radius}: {numbers} values with {channels} channels"
+                    "must be at least 1, and windows must have at most {LONGEST} values; got {radius}, {numbers} values with {channels} channels"
                 ),
             ));
         }
@@ -213,7 +213,7 @@ impl<const D: usize> Appearance<D> {
         Some(at)
     }
 
-    /// Returns the row-major position of the sample nearest to one that may be outside.
+    /// Returns the row-major position of the sample of the exemplar that is nearest to `sample`. Periodic axes wrap.
     #[inline(always)]
     pub fn clamped(&self, sample: [i32; D]) -> usize {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
@@ -233,7 +233,7 @@ impl<const D: usize> Appearance<D> {
         at
     }
 
-    /// Moves a place to where its window is inside the exemplar. Periodic axes wrap, and places are clamped along the
+    /// Moves a place so that its window is inside the exemplar. Periodic axes wrap, and places are clamped along the
     /// others.
     #[inline(always)]
     pub fn bring_inside(&self, mut place: Place<D>) -> Place<D> {
@@ -425,7 +425,7 @@ impl<const D: usize> Appearance<D> {
                 best = best.min(distance(&mine, other));
             }
         }
-        // A small exemplar may have no window that is far enough away.
+        // A small exemplar may not have a window that is far enough away. Then return a moderate spacing.
         if best == i32::MAX { UNIT / 4 } else { best }
     }
 }
@@ -437,7 +437,8 @@ impl<const D: usize> Appearance<D> {
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;
     for k in 0..KEEP {
-        // Vectors have 12 bits, so the difference fits into 16. Products of 16 bits are the fastest in SIMD.
+        // Components have 12 bits, so their difference fits into 16 bits. Products of 16-bit integers are the fastest
+        // in SIMD.
         let d = a[k].wrapping_sub(b[k]);
         sum += i32::from(d) * i32::from(d);
     }

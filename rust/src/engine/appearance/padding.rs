@@ -9,7 +9,7 @@ use crate::foundation::grid::Grid;
 pub struct Padding<const D: usize> {
     colours: Vec<Colour>,
     strides: [i32; D],
-    /// Position of the sample at the origin.
+    /// Position of the exemplar's first sample in `colours`.
     zero: i32,
 }
 
@@ -33,7 +33,7 @@ impl<const D: usize> Padding<D> {
         }
     }
 
-    /// Returns the colour of a sample that is at most the margin outside of the exemplar.
+    /// Returns the colour of a sample in the exemplar or in its margin.
     #[inline(always)]
     pub fn colour(&self, sample: [i32; D]) -> Colour {
         let mut at = self.zero;

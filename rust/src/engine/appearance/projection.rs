@@ -13,7 +13,7 @@ pub(super) struct Projection {
     pub(super) padded: usize,
     pub(super) basis: Vec<i16>,
     pub(super) bias: [i64; KEEP],
-    /// Factor from products with the basis to vectors, in units of 2^-32.
+    /// Factor that turns products with the basis into components of a vector, in units of 2^-32.
     pub(super) gain: i64,
 }
 
@@ -100,7 +100,7 @@ wide_fn! {
             for (&w, &x) in row.iter().zip(window) {
                 sum += i32::from(w) * i32::from(x);
             }
-            // The product cannot overflow if the analysis was computed here. With parts from elsewhere, it may wrap.
+            // The product cannot overflow if the analysis was computed here. With restored arrays, it may wrap.
             let product = (i64::from(sum) - projection.bias[k]).wrapping_mul(projection.gain);
             let scaled = product.wrapping_add(1 << 31) >> 32;
             feature[k] = scaled.clamp(-2047, 2047) as i16;

@@ -24,7 +24,7 @@ pub struct Parts<const D: usize> {
     pub basis: Vec<i16>,
     /// The projection of the mean window.
     pub bias: [i64; KEEP],
-    /// Factor from products to vectors, in units of 2^-32.
+    /// Factor that turns products with the basis into components of a vector, in units of 2^-32.
     pub gain: i64,
     /// Median distance from a window to the nearest other window.
     pub spacing: i32,
@@ -76,7 +76,7 @@ impl<const D: usize> Appearance<D> {
         {
             return Err(Error::value(
                 "analysis",
-                "must contain arrays that match, as `parts` returns them",
+                "must contain undamaged arrays that match each other, as `parts` returns them",
             ));
         }
         Ok(Self {

@@ -120,7 +120,7 @@ proptest! {
         let other: Vec<f32> = colours.iter().map(|x| x * gain + lift).collect();
         let [a, b] = [colours, other].map(|c| Appearance::new(&c, grid, 3, 2).unwrap());
         for i in 0..grid.len() {
-            // Colours may differ by one step after rounding.
+            // Rounded colours may differ by one step.
             prop_assert!(distance(a.feature(i), b.feature(i)) < UNIT / 100);
         }
     }

@@ -3,8 +3,8 @@
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
-/// Maximum number of samples along an axis. A place is a 32-bit number with 12 fractional bits, which must also be
-/// able to represent steps.
+/// Maximum number of samples along an axis. A coordinate is a 32-bit number with 12 fractional bits, so 2^18 samples
+/// need 30 bits. The other bits are needed for steps out of the exemplar.
 const SIDE: usize = 1 << 18;
 
 /// Samples whose windows are inside an exemplar.
@@ -21,7 +21,7 @@ impl<const D: usize> Centres<D> {
             .product()
     }
 
-    /// Returns the sample with a number.
+    /// Returns the `number`-th sample in row-major order.
     pub(crate) fn get(&self, mut number: usize) -> [i32; D] {
         let mut sample = [0; D];
         for axis in (0..D).rev() {
@@ -57,7 +57,7 @@ pub(super) fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Resu
     if shape.iter().any(|&n| n > SIDE) || points > i32::MAX as usize {
         return Err(Error::Limit {
             what: format!("an exemplar of {shape:?}"),
-            needed: format!("{points} samples with its rim"),
+            needed: format!("{points} samples with its margin"),
             limit: format!("{} samples, {SIDE} along an axis", i32::MAX),
         });
     }

@@ -78,11 +78,11 @@ impl<const D: usize> Cells<D> {
         })
     }
 
-    /// Returns whether a point inside the margin depends on the choice of a cell in a round.
+    /// Returns whether a point that is not in the margin depends on the choice of a cell in a round.
     ///
-    /// A point is at most `far` from the centre of the cell it falls into, and its own cell's centre is not farther.
-    /// Each later round reads the shell, one point further, and the centres of the cells that own it. If repetition
-    /// counts, it also reads the centres of cells two steps away.
+    /// A point is at most `far` from the centre of the cell it falls into. The nearest centre, which owns the point,
+    /// is not farther. Each later round reads the shell, which is one point wider, and the centres of the cells that
+    /// own the points of the shell. If `repetition` is above 0, it also reads the centres of cells two steps away.
     pub(super) fn counts(&self, cell: usize, options: &Options, round: usize) -> bool {
         let side = options.cell as f64;
         let far = ((0.5 + STRAY) * side).ceil() as usize;

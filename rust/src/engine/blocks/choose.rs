@@ -27,7 +27,8 @@ pub(super) struct Around<'a, const D: usize> {
 
 /// A point of the shell.
 struct Beyond<const D: usize> {
-    /// Step in the exemplar from the place of the cell's centre to the continuation at this point.
+    /// Step in the exemplar from the place of the cell's centre to the sample that would continue the patch at this
+    /// point.
     step: [i32; D],
     /// The sample that the output shows at this point.
     there: usize,
@@ -89,7 +90,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// Draws a place for the cell's centre.
+    /// Draws a random place for the cell's centre.
     pub(super) fn place(&self, noise: &Noise, round: u32, draw: u32) -> Place<D> {
         let words = noise.at(self.world, round << 16 | draw);
         std::array::from_fn(|axis| {
@@ -113,7 +114,8 @@ impl<'a, const D: usize> Chooser<'a, D> {
     /// Returns the surroundings of the cell.
     pub(super) fn around<'c>(&self, places: &[Place<D>], contrasts: &'c [i32]) -> Around<'c, D> {
         let shell = self.cell.shell.iter().map(|&(q, step)| Beyond {
-            // Round the step alone. Patches are placed on whole samples, so the result is the same for all candidates.
+            // Round the step separately from the place. Patches are placed on whole samples, so the rounded step is
+            // the same for all candidates.
             step: nearest(apply(&self.cell.frame, step)),
             there: self.appearance.clamped(nearest(places[q as usize])),
         });

@@ -6,7 +6,7 @@
 //! cell with the samples that are there. Plain squared differences would favour low-contrast patches, which are near
 //! every other patch on average. So they are divided by the contrast of both.
 //!
-//! The result at a point depends only on the world's coordinates within two cells for each of the `rounds`.
+//! The result at a point depends only on world coordinates, and in each round only on cells up to two steps away.
 
 mod cells;
 mod choose;
@@ -41,14 +41,15 @@ pub struct Options {
     pub candidates: usize,
     /// Weight of the contrast of the patches in the divisor of misfits, 0 to 1. At 0 the divisor is constant.
     pub contrast: f64,
-    /// Cost of continuing a neighbour exactly, in misfits of unrelated patches. Without it the exemplar would be
-    /// copied whole.
+    /// Cost of continuing a neighbour exactly, in units of the misfit of unrelated patches. Without it the exemplar
+    /// would be copied whole.
     pub continuation: f64,
-    /// Cost of repeating a cell nearby, in the same units.
+    /// Cost of repeating the patch of a nearby cell, in the same units.
     pub repetition: f64,
     /// Seed of the random numbers. Each seed gives another texture.
     pub seed: u64,
-    /// Width in points of a margin that only supports the inner points. Cells that cannot affect these are not chosen.
+    /// Width in points of a margin that only supports the inner points. Cells that cannot affect the inner points do
+    /// not choose patches.
     pub margin: usize,
 }
 
@@ -90,7 +91,7 @@ pub fn blocks<const D: usize>(
         return Err(Error::value(
             "cell",
             format!(
-                "must be from 2 to {MOST} points, with at least 1 and fewer than {MOST} candidates and rounds, got {options:?}"
+                "must be from 2 to {MOST} points, and candidates and rounds from 1 to below {MOST}; got {options:?}"
             ),
         ));
     }

@@ -66,7 +66,7 @@ fn pieces_are_coherent_and_inside() {
 #[test]
 fn a_window_is_the_same_wherever_it_is_seen_from() {
     let exemplar = exemplar(true);
-    // In each round, a result depends on points one cell further away.
+    // In each round, a result depends on cells up to two steps away.
     let pad = (OPTIONS.rounds + 2) * OPTIONS.cell * 2;
     let [a, b] = [0, 11].map(|extra| {
         let start = -(pad as i32) - extra;

@@ -172,7 +172,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         classes
     }
 
-    /// Returns the lattice neighbours phi / |phi|, where phi = F d and the frame is J = F^-1.
+    /// Returns the lattice neighbour of each diagonal d: phi / |phi|, rounded, where phi = F d and the frame is J =
+    /// F^-1.
     fn corners(&self, frame: &Frame<D>) -> [Corner<D>; CORNERS] {
         let turned = inverse(frame);
         let mut corners = [Corner {
@@ -188,7 +189,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                     .sum()
             });
             let square: i64 = phi.iter().map(|x| x * x).sum();
-            // Round x / |phi|, which is at most 1, to the nearest integer: 1 from 0.5.
+            // Round x / |phi|, which is at most 1, to the nearest integer. A magnitude of 0.5 is rounded to 1.
             corner.step = phi.map(|x| {
                 if 4 * x * x >= square {
                     x.signum() as i32
@@ -315,8 +316,8 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
     }
 }
 
-/// Adds squared differences. Vectors have 12 bits, so the sums of eight vectors fit, and so does the total of all
-/// lanes.
+/// Adds the squared differences of two vectors to `sums`. Components have 12 bits, so the sums of eight vectors fit
+/// into 32 bits, and so does the total of all lanes.
 #[inline(always)]
 fn added<const N: usize>(mut sums: [u32; LANES], a: &[i16; N], b: &[i16; N]) -> [u32; LANES] {
     for (a, b) in a.as_chunks().0.iter().zip(b.as_chunks().0) {

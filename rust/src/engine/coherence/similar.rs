@@ -17,9 +17,9 @@ pub struct Similarity {
     pub sets: Vec<u32>,
 }
 
-/// Finds the similarity set of each sample. C_1 is the sample itself. Each further C_j is the nearest in the first
-/// `numbers` of the appearance vectors ([`FEW`] or all). It must be more than (n - 1) / 2 away, along some axis, from
-/// every earlier one.
+/// Finds the similarity set of each sample. C_1 is the sample itself. Each further C_j is the sample with the nearest
+/// appearance vector, by its first `numbers` components ([`FEW`] or all). It must be more than (n - 1) / 2 away, along
+/// some axis, from every earlier one.
 ///
 /// The whole exemplar is searched. If distances are equal, the first sample is taken.
 pub fn similar<const D: usize>(
@@ -32,7 +32,7 @@ pub fn similar<const D: usize>(
     if !(1..=LARGEST).contains(&k) || n.is_multiple_of(2) || n > i32::MAX as usize {
         return Err(Error::value(
             "k",
-            format!("must be 1 to {LARGEST} with an odd n, got k = {k} and n = {n}"),
+            format!("must be from 1 to {LARGEST}, and n must be odd; got k = {k} and n = {n}"),
         ));
     }
     if appearance.grid().len() > u32::MAX as usize / 2 {
@@ -112,8 +112,9 @@ fn search<const D: usize, const N: usize>(
             return Err(Error::value(
                 "n",
                 format!(
-                    "must be smaller, because an exemplar of shape {:?} does not have {k} samples {n} apart for windows of radius {}; lower k or n, or use a larger exemplar",
+                    "must be smaller, because an exemplar of shape {:?} does not have {k} samples that are more than {} apart, for windows of radius {}; lower k or n, or use a larger exemplar",
                     grid.shape(),
+                    n / 2,
                     appearance.radius()
                 ),
             ));

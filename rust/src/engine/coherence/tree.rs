@@ -1,4 +1,4 @@
-//! An exact search for the nearest vector that is allowed, by a tree of boxes with eight children at each node.
+//! An exact search for the nearest allowed vector, by a tree of boxes with eight children at each node.
 
 use super::boxes::{Boxes, WIDTH, extent, pairs};
 use super::{FEW, apart, boxes};
@@ -6,20 +6,21 @@ use crate::foundation::par;
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use crate::foundation::simd::V3;
 
-/// Number of vectors in a leaf. A leaf has as many blocks as a node has children.
+/// Number of vectors in a leaf. A leaf has eight blocks of eight vectors.
 const LEAF: usize = WIDTH * WIDTH;
-/// Number of vectors above which both halves are arranged in parallel.
+/// Number of vectors above which the two halves are arranged in parallel.
 const APART: usize = 1024;
 
 /// Vectors with their samples, ordered so that neighbours in the list are similar.
 ///
-/// Eight vectors form a block, eight blocks a leaf, eight leaves a node, and so on; only the last of each has fewer.
-/// The bounds of a box cover the first [`FEW`] numbers, the leading components, which distinguish vectors best. They
-/// are lower bounds for the distances of longer vectors as well.
+/// Eight vectors form a block, eight blocks a leaf, eight leaves a node, and so on. Only the last of each may have
+/// fewer. The bounds of a box cover the first [`FEW`] components of the vectors, which distinguish vectors best. They
+/// are also lower bounds for the distances of longer vectors.
 pub(super) struct Tree<const D: usize, const N: usize> {
     places: Vec<Place<D, N>>,
     blocks: Vec<boxes::Block>,
-    /// The boxes of the children: of the blocks of each leaf, then of the leaves of each node, up to a single node.
+    /// The boxes of the children. The first level contains the boxes of the blocks of each leaf, and the next level
+    /// the boxes of the leaves of each node. The last level has a single node.
     levels: Vec<Vec<Boxes>>,
 }
 
@@ -200,7 +201,7 @@ fn arrange<const D: usize, const N: usize>(items: &mut [Place<D, N>], mut unit: 
         .max_by_key(|&k| i32::from(bounds[k].1) - i32::from(bounds[k].0))
         .unwrap_or(0);
     let middle = items.len().div_ceil(unit) / 2 * unit;
-    // Order equal values by number, so that the lowest number of equal vectors is still found at once.
+    // Order equal values by number, so that the search still finds the lowest number of equal vectors first.
     items.select_nth_unstable_by_key(middle, |item| (item.vector[widest], item.number));
     let large = items.len() > APART;
     let (low, high) = items.split_at_mut(middle);

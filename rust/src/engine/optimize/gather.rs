@@ -1,4 +1,4 @@
-//! Windows of the output, along the axes of the exemplar.
+//! Windows of the output, aligned with the axes of the exemplar.
 
 use super::{CHUNK, Level};
 use crate::engine::appearance::{Colour, Feature};
@@ -8,8 +8,8 @@ use crate::foundation::fixed::{
 use crate::foundation::par;
 use std::ops::Range;
 
-/// The colours of a range of the output and of the points within the reach of windows. This is only filled if all
-/// frames are the identity, because then a window is a box of these colours.
+/// The colours of a range of points of the output, and of all points within the reach of their windows. This is filled
+/// only if all frames are the identity, because then a window is a box of these colours.
 #[derive(Default)]
 pub(super) struct Seen {
     first: usize,
@@ -50,24 +50,24 @@ impl<const D: usize> Level<'_, D> {
     }
 }
 
-/// The position that an offset o of a window reads.
+/// The position that is read for an offset o of a window.
 struct Look<const D: usize> {
     /// The step to the point of the output nearest to F o; `across` is the same step in row-major order.
     step: [i32; D],
     across: isize,
-    /// The remainder o - J step. Without it, rotated textures would get the wrong scale.
+    /// The remainder o - J step. Without it, rotated textures would have the wrong scale.
     rest: Place<D>,
 }
 
-/// Reads windows one after another. Recomputes the positions only if the frame changes.
+/// Reads windows one after another, and recomputes their positions only if the frame changes.
 pub(super) struct Eye<'a, const D: usize> {
     level: &'a Level<'a, D>,
     seen: &'a Seen,
     window: Vec<i16>,
     frame: Option<Frame<D>>,
     looks: Vec<Look<D>>,
-    /// Maximum distance from the point to a position, along each axis of the output. `None` if each position must be
-    /// checked.
+    /// Maximum distance from the centre of a window to its positions, along each axis of the output. `None` if each
+    /// position must be checked.
     reach: Option<[usize; D]>,
 }
 
@@ -100,7 +100,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         let interior = self.reach.is_some_and(|reach| {
             (0..D).all(|a| point[a] >= reach[a] && point[a] + reach[a] < grid.shape()[a])
         });
-        // Choose the fastest way to read that is allowed here.
+        // Choose the fastest way of reading that is allowed at this point.
         if !interior {
             self.look_around(places, p, point);
         } else if self.seen.colours.is_empty() {
@@ -138,8 +138,8 @@ impl<'a, const D: usize> Eye<'a, D> {
             Look { step, across, rest }
         }));
         self.frame = Some(frame);
-        // Skip the checks if the remainders are short. Places are inside, and the margin of the exemplar is wider than
-        // windows.
+        // Skip the checks if the remainders are short. Each place has its window inside the exemplar, and the margin
+        // of the exemplar is wider than windows.
         let near = frame == identity()
             || frame
                 .iter()
@@ -149,7 +149,7 @@ impl<'a, const D: usize> Eye<'a, D> {
         });
     }
 
-    /// Reads a window that is known to be inside.
+    /// Reads a window that is entirely inside the region.
     #[inline(always)]
     fn look(&mut self, places: &[Place<D>], p: usize) {
         let appearance = self.level.appearance;
@@ -160,8 +160,8 @@ impl<'a, const D: usize> Eye<'a, D> {
         }
     }
 
-    /// Reads a window near the end of the region or of the exemplar. Outside the region, the patch of the point
-    /// continues.
+    /// Reads a window near the border of the region or with long remainders. Outside the region, the patch of the
+    /// point continues.
     fn look_around(&mut self, places: &[Place<D>], p: usize, point: [usize; D]) {
         let appearance = self.level.appearance;
         let looks = self.looks.iter().zip(appearance.offsets());

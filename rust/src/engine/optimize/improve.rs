@@ -1,4 +1,4 @@
-//! The search for a better match of a point, among its neighbours' matches and drawn ones.
+//! The search for a better match of a point, among the matches of its neighbours and random ones.
 
 use super::gather::{Eye, Seen};
 use super::{FINEST, Level};
@@ -31,7 +31,7 @@ impl<const D: usize> Level<'_, D> {
         number: u32,
         monitor: &Monitor,
     ) -> Result<()> {
-        // A periodic exemplar has a spacing of 0, but rounded colours still differ a little.
+        // The spacing of a periodic exemplar is 0, but rounded colours still differ a little.
         let spacing = f64::from(self.appearance.spacing().max(FINEST));
         let search = Search {
             noise: Noise::new(self.options.seed).part(3),
@@ -39,7 +39,7 @@ impl<const D: usize> Level<'_, D> {
             limit: (self.options.acceptance * spacing) as i64,
             coherence: (self.options.coherence * spacing) as i64,
         };
-        // Work in slabs, so that the colours of identity frames need little memory.
+        // Work in slabs, so that the colours that `Seen` copies need little memory.
         let mut seen = Seen::default();
         let slab = self.slab();
         for start in (0..places.len()).step_by(slab) {
@@ -110,7 +110,7 @@ impl<const D: usize> Level<'_, D> {
                 beside = count;
             }
         }
-        // The coherence cost of a place, from the number of adjacent proposals that belong to another patch.
+        // The coherence cost of a place depends on the number of adjacent proposals that belong to another patch.
         let apart = |place: Place<D>| -> i64 {
             if search.coherence == 0 {
                 return 0;
@@ -129,8 +129,8 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
-        // Stop here if no random match can be better by the limit, because windows of the exemplar are rarely nearer
-        // than their spacing.
+        // Stop here if a random match is unlikely to be better by the limit. Windows of the exemplar are rarely nearer
+        // to each other than its spacing.
         if least <= search.limit + search.limit / 2 {
             return best;
         }
@@ -138,7 +138,7 @@ impl<const D: usize> Level<'_, D> {
         // Draw all candidates around one place, so that their costs are close in memory.
         let drawn: [Place<D>; DRAWS] = std::array::from_fn(|draw| {
             let words = search.noise.at(world, search.number << 8 | draw as u32);
-            // The first draw takes a sample near the value that the guide wants.
+            // The first draw is a sample near the value that the guide wants.
             if draw == 0
                 && let Some(near) = self.guide.and_then(|g| g.near(p, words[0]))
             {
@@ -155,7 +155,7 @@ impl<const D: usize> Level<'_, D> {
             Some(there) => cost_of(there),
             None => i64::MAX / 2,
         });
-        // Compute the coherence cost only if the match could win without it.
+        // Compute the coherence cost only if the match is the best without it.
         for (place, cost) in drawn.into_iter().zip(costs) {
             let cost = cost + search.limit;
             if cost < least {

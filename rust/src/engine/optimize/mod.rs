@@ -1,20 +1,22 @@
-//! Texture optimisation: coordinates are corrected until every window of the output resembles one of the exemplar.
+//! Texture optimisation: coordinates are corrected until every window of the output resembles a window of the
+//! exemplar.
 //!
-//! The method is by Kwatra et al., *Texture optimization for example-based synthesis*, SIGGRAPH 2005, applied to
-//! coordinates instead of colours, so each step copies. A pass corrects every other point, as on a chessboard.
-//! Otherwise neighbours at the border of two patches would read each other at once and only swap. For each of its
-//! points a pass does the following:
+//! The method is by Kwatra et al., *Texture optimization for example-based synthesis*, SIGGRAPH 2005. It is applied to
+//! coordinates instead of colours, so that each point copies a sample. A pass corrects every other point, as on a
+//! chessboard. Otherwise neighbours at the border of two patches would read each other's old places at once and only
+//! swap them. A pass does the following for each point that it corrects:
 //!
-//! 1. It gathers the window around the point, along the exemplar's axes, through the present coordinates.
+//! 1. It gathers the window around the point, aligned with the exemplar's axes, through the present coordinates.
 //! 2. It looks for a better match among the neighbours' matches (Barnes et al., *PatchMatch*, SIGGRAPH 2009) and a few
 //!    random matches around the best one.
 //! 3. It votes: it takes one of the coordinates that the windows around the point propose.
 //!
-//! There are three departures from the papers. A random match must be better by a multiple of the exemplar's own
-//! spacing (an acceptance threshold). So good matches stay, and sparse features are not washed out. A point is skipped
-//! if all its neighbours show the same patch of the exemplar, because only borders of patches need corrections. It is
-//! also skipped if nothing around it has changed since its last correction. The frame's Jacobian displaces a window or
-//! a match that is carried to another point (Lefebvre and Hoppe, 2006).
+//! There are three departures from the papers. First, a random match must be better by a multiple of the exemplar's
+//! own spacing (an acceptance threshold). Good matches therefore stay, and sparse features are not washed out. Second,
+//! a point is skipped if all its neighbours show the same patch of the exemplar, because only borders of patches need
+//! corrections. A point is also skipped if nothing around it has changed since its last correction. Third, the frame's
+//! Jacobian displaces the positions of a window, and matches that are carried to another point (Lefebvre and Hoppe,
+//! 2006).
 
 mod gather;
 mod improve;
@@ -34,11 +36,11 @@ use self::recent::Recent;
 
 /// Number of points in a task.
 const CHUNK: usize = 2048;
-/// Windows at this distance or nearer count as equal.
+/// Minimum spacing of an exemplar that costs are scaled by. Windows at a smaller distance count as equal.
 const FINEST: i32 = UNIT / 256;
-/// Distance from a change, in points, within which points are corrected again.
+/// Points within this distance of a change, in points, are corrected again.
 const NEAR: usize = 1;
-/// Maximum of the acceptance and the coherence.
+/// Maximum of the options `acceptance` and `coherence`.
 const DEAREST: f64 = 1e6;
 /// Minimum number of points between two checks for cancellation.
 const SLAB: usize = 1 << 18;
@@ -48,7 +50,7 @@ const SLAB: usize = 1 << 18;
 pub struct Options {
     /// Maximum number of passes. Each corrects every other point.
     pub passes: usize,
-    /// Number of the first pass, if several calls share the work.
+    /// Number of the first pass. It is above 0 if earlier calls have made the first passes.
     pub first: u32,
     /// If true, also compare each window with all windows of the exemplar. This is slow for large exemplars.
     pub exhaustive: bool,
@@ -61,8 +63,8 @@ pub struct Options {
     pub coherence: f64,
     /// Radius of the vote, in points. At 0 each point takes the match of its own window.
     pub vote: usize,
-    /// Stop if two passes change less than this share of the points. At 0 never stop early, so that results do not
-    /// depend on distant points.
+    /// Stop if two passes change less than this fraction of the points. At 0, passes never stop early, so that results
+    /// do not depend on distant points.
     pub settled: f64,
     /// Seed of the random numbers. It should differ for each resolution.
     pub seed: u64,
@@ -81,8 +83,8 @@ struct Level<'a, const D: usize> {
     recent: Recent,
 }
 
-/// Corrects `places`, one for each point of `region`. Points that are `held` are hard constraints: they keep their
-/// places. Returns the number of passes, and the share of the points that the last two passes changed.
+/// Corrects `places`, one for each point of `region`. Points that are `held` are hard constraints, which keep their
+/// places. Returns the number of passes, and the fraction of the points that the last two passes changed.
 #[allow(clippy::too_many_arguments)] // the exemplar, the region, and their properties
 pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
@@ -103,7 +105,7 @@ pub fn correct<const D: usize>(
         return Err(Error::value(
             "options",
             format!(
-                "must have a reach of 1 or 2 and a vote of at most the radius of windows, got {options:?}"
+                "must have reach 1 or 2 and vote at most the radius of windows, got {options:?}"
             ),
         ));
     }
@@ -112,7 +114,7 @@ pub fn correct<const D: usize>(
         return Err(Error::value(
             "options",
             format!(
-                "must have acceptance and coherence from 0 to {DEAREST:e}, and a settled share, got {options:?}"
+                "must have acceptance and coherence from 0 to {DEAREST:e}, and settled must be a number; got {options:?}"
             ),
         ));
     }
@@ -171,7 +173,7 @@ pub fn correct<const D: usize>(
 
 impl<const D: usize> Level<'_, D> {
     /// Returns the number of points between two checks for cancellation. It is much larger than the reach of windows,
-    /// because the points within reach are read for both slabs.
+    /// because the points within reach of two slabs are read for both.
     fn slab(&self) -> usize {
         SLAB.max(8 * self.margin())
     }
@@ -183,8 +185,8 @@ impl<const D: usize> Level<'_, D> {
     }
 
     /// Returns whether a pass corrects a point. The point must have the colour of the pass on the chessboard, a recent
-    /// change nearby, and another patch next to it. With a guide or an exhaustive search the last condition is not
-    /// required.
+    /// change nearby, and a neighbour that shows another patch. With a guide or an exhaustive search, the last
+    /// condition is not required.
     #[inline(always)]
     fn corrects(&self, places: &[Place<D>], p: usize, pass: u32) -> bool {
         let point = self.region.grid.point(p);

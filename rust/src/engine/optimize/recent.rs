@@ -1,4 +1,4 @@
-//! Recent changes, near which points are corrected again. Elsewhere a window is nearly the same as at the last
+//! Recent changes. Only points near a change are corrected again. Elsewhere a window is nearly the same as at the last
 //! correction, so another search would find the same match. A change next to a point often changes its match, but a
 //! distant change rarely does.
 
@@ -7,11 +7,12 @@ use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 
-/// Flags of the points near a change in one of the last two passes. The two passes correct the two colours of the
+/// Flags of the points near a change in one of the last two passes, which together correct both colours of the
 /// chessboard.
 pub(super) struct Recent {
     radius: usize,
-    /// Changes of each point in the last two passes, as one bit for each pass. The lowest bit is the latest pass.
+    /// For each point, one bit for each of the last two passes, set if the pass changed the point. The lowest bit is
+    /// the latest pass.
     changed: Vec<u8>,
     /// Not zero at points near a change. Empty until two passes are complete.
     near: Vec<u8>,

@@ -159,7 +159,8 @@ fn dense_and_constant_frames_agree() {
 
 #[test]
 fn a_window_is_the_same_wherever_it_is_seen_from() {
-    // A pass reaches three points: two for a window or a neighbour's match, and one for the vote.
+    // In a pass, a point depends on points up to three away: two for a window or a neighbour's match, and one for the
+    // vote.
     let pad = 3 * OPTIONS.passes as i32;
     let exemplar = exemplar::<2>(32);
     let [a, b] = [0, 9].map(|extra| {

@@ -5,13 +5,13 @@ use crate::engine::appearance::{CHANNELS, Colour, UNIT};
 use crate::foundation::fixed::{Place, add, apply, nearest};
 use crate::foundation::libm::exp;
 
-/// Standard deviation of the Gaussian that weights a proposal by the distance of its window, in points.
+/// Standard deviation, in points, of the Gaussian that weights a proposal by the distance of its window.
 const SIGMA: f64 = 2.0;
-/// Handicap of a proposal from a distant window, in units of the variance of colours.
+/// Largest extra cost of a proposal from a distant window, in units of the variance of colours.
 const DISTANCE: f64 = 0.03;
 
-/// A window that proposes a place: the step to its centre, the weight of its colour in units of 1/256, and its
-/// handicap.
+/// A window that proposes a place: the step to its centre, the weight of its colour in units of 1/256, and its extra
+/// cost.
 struct Voter<const D: usize> {
     step: [i32; D],
     weight: i32,
@@ -29,7 +29,7 @@ impl<const D: usize> Level<'_, D> {
         number: u32,
     ) {
         let voters = self.voters(self.options.vote as i32);
-        // Factor from the units of vectors to the units of colours.
+        // Factor from the units of appearance vectors to the units of colours.
         let unit = (256.0 * self.appearance.colour_variance() / f64::from(UNIT)) as i64;
         let all = 0..places.len();
         self.pass(places, all, to, number, Vec::new, |proposals, p| {
@@ -76,7 +76,7 @@ impl<const D: usize> Level<'_, D> {
             let Some(q) = self.region.step(point, voter.step) else {
                 continue;
             };
-            // Carry the match of the window back to the point by the frame.
+            // Carry the match of the window back to the point by the point's frame.
             let place = add(matches[q], apply(&frame, voter.step.map(|x| -x)));
             if let Some(at) = appearance.inside(nearest(place)) {
                 let colour = appearance.colour(at);

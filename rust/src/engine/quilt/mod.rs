@@ -1,4 +1,4 @@
-//! Image quilting: patches are cut in one by one, each chosen for an invisible seam and little repetition.
+//! Image quilting: patches are inserted one by one, each chosen for a barely visible seam and little repetition.
 //!
 //! The method is by Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001. For each
 //! window in turn:
@@ -7,10 +7,10 @@
 //! 2. *charge*: add a penalty if other patches show the same place, or if the patch continues its neighbour exactly
 //!    (`penalties`);
 //! 3. *refine*: improve the best few to the exact pixel;
-//! 4. *cut*: let the stitcher cut in each of them, and keep the cheapest.
+//! 4. *cut*: let the stitcher insert each of them along a minimum cut, and keep the cheapest.
 //!
 //! The documentation of `texrs.quilting` lists the departures from the paper. The windows of a wave do not overlap.
-//! They are chosen in parallel, from the texture before the wave.
+//! Their patches are chosen in parallel, from the texture before the wave.
 
 mod penalties;
 mod pool;
@@ -27,11 +27,11 @@ use pool::halve;
 use window::Around;
 pub use window::{Span, Window};
 
-/// Marks a pixel that is not copied from any place yet.
+/// Marks a pixel of the texture that no patch covers yet.
 const FREE: u32 = u32::MAX;
-/// Number of matches of the pool that are cut in.
+/// Number of matches of the pool that are inserted on trial.
 const CANDIDATES: usize = 3;
-/// Side in pixels of the cells whose use is counted. Overlaps are compared at the same spacing.
+/// Side in pixels of the cells whose use is counted. Overlaps are compared at pixels with the same spacing.
 const CELL: usize = 8;
 
 /// An image that patches are taken from, such as the exemplar or its mirror image.
@@ -203,7 +203,7 @@ impl<'a> Quilt<'a> {
     /// Copies the first patch, without a cut.
     ///
     /// # Errors
-    /// Returns an error if the window does not fit, or if the image has no room for a patch at the place.
+    /// Returns an error if the window does not fit, or if a patch at this place does not fit into the image.
     pub fn lay_first(&mut self, window: &Window, picture: usize, at: [usize; 2]) -> Result<()> {
         self.check(window)?;
         let patch = self.options.patch;
@@ -285,7 +285,7 @@ impl<'a> Quilt<'a> {
         })
     }
 
-    /// Copies the pixels of a patch that are taken.
+    /// Copies the pixels of a patch for which `take` is true into the texture.
     fn lay(&mut self, window: &Window, found: &Match, take: impl Fn(usize) -> bool) {
         let corner = window.corner();
         let step = [found.row, found.column];
@@ -313,8 +313,8 @@ impl<'a> Quilt<'a> {
         self.pastes += 1;
     }
 
-    /// Cuts the most promising matches into the present content. Returns the one with the least visible seam and the
-    /// least repetition.
+    /// Inserts the most promising matches into the present content on trial. Returns the match with the least visible
+    /// seam and the least repetition.
     fn choose(&self, window: &Window, monitor: &Monitor) -> Result<Chosen> {
         let bounds = window.bounds();
         let old: Vec<u32> = bounds

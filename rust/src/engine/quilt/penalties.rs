@@ -6,7 +6,7 @@ use crate::kernels::patch_search::Match;
 /// Penalty of a patch whose content all other patches show too, in units of the cost of a good match. Few places fit
 /// if elements are on a plain background. A larger penalty would then select patches that cut elements.
 const REPETITION: f64 = 10.0;
-/// Share of matches that count as good.
+/// Fraction of the matches that count as good.
 const GOOD: f64 = 0.1;
 /// Repetition penalty on a lattice, in units of the cost of a typical match. There all places are similar, and patches
 /// must meet exactly.

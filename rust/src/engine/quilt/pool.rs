@@ -9,7 +9,7 @@ use crate::kernels::patch_search::{Match, Pick, Query};
 const POOL: [usize; 2] = [48, 96];
 
 impl Quilt<'_> {
-    /// Finds matches that are some distance apart, each exact to a pixel.
+    /// Finds matches that are some distance apart. Their positions are accurate to one pixel.
     pub(super) fn find_pool(
         &self,
         colours: &[f32],
@@ -40,7 +40,7 @@ impl Quilt<'_> {
             ratio: f64::INFINITY,
         };
         let mut pool = half.best(&query, &pick, monitor)?;
-        // Return to the full size. The position is then exact to a pixel.
+        // Convert the positions to the full size, where they are accurate to one pixel.
         for m in &mut pool {
             let most = self.most(m.exemplar);
             m.row = (2 * m.row).min(most[0]);
@@ -94,7 +94,7 @@ impl Quilt<'_> {
         }
     }
 
-    /// Returns the best match within a pixel of each given match.
+    /// Returns the best match within one pixel of each given match.
     pub(super) fn refine(
         &self,
         matches: &[Match],

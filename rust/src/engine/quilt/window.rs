@@ -22,7 +22,7 @@ pub(super) struct Box2 {
     ends: [[i64; 2]; 2],
 }
 
-/// A window with a margin of one pixel, as far as there are pixels.
+/// A window with a margin of one pixel, clipped where the texture ends.
 pub(super) struct Around {
     pub bounds: Box2,
     /// Offset of the window in the bounds.
@@ -42,7 +42,7 @@ impl Box2 {
         self.shape().iter().product()
     }
 
-    /// Returns the positions of its pixels in a texture of a size. Ends wrap around.
+    /// Returns the positions of the box's pixels in a texture of the given size. Coordinates wrap around its ends.
     pub(super) fn points(&self, size: [usize; 2]) -> impl Iterator<Item = usize> + use<> {
         let [rows, columns] = self.ends;
         let around = |i: i64, axis: usize| i.rem_euclid(size[axis] as i64) as usize;
@@ -138,7 +138,8 @@ impl Around {
         for r in 0..rows {
             for c in 0..columns {
                 let i = (self.inner[0] + r) * width + self.inner[1] + c;
-                // If the window spans the period, the patch meets itself, so its end lines are kept.
+                // If the window spans the period, the patch meets itself, so the pixels shown in its first and last
+                // line are kept.
                 let end = self.closed[0] && (r == 0 || r + 1 == rows)
                     || self.closed[1] && (c == 0 || c + 1 == columns);
                 mask[i] = !end || shown[i] == super::FREE;

@@ -1,4 +1,4 @@
-//! The state of a stitched output, and windows of it.
+//! The state of an output that is being stitched, and its windows.
 
 use super::chart::Chart;
 use super::cut::Cutting;
@@ -7,11 +7,11 @@ use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 
-/// Number of a point that does not show a patch yet.
+/// Patch number of a point that does not show a patch yet.
 pub(super) const FREE: u32 = u32::MAX;
-/// Number of a given point that no patch may take.
+/// Patch number of a given point that no patch may take.
 pub(super) const HELD: u32 = u32::MAX - 1;
-/// Number of a given point that a patch may take.
+/// Patch number of a given point that a patch may take.
 pub(super) const LOOSE: u32 = u32::MAX - 2;
 
 /// Returns whether the number of a point is the number of a patch.
@@ -129,7 +129,7 @@ impl<const D: usize> Canvas<D> {
 }
 
 impl<const D: usize> Window<D> {
-    /// Returns a window that is a whole canvas of a shape.
+    /// Returns a window that covers a whole canvas of the given shape.
     pub(super) fn alone(shape: [usize; D]) -> Result<Self> {
         let grid = Grid::new(shape, [false; D])?;
         Ok(Self {

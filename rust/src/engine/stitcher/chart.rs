@@ -5,11 +5,13 @@ use super::mesh::Mesh;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply, inverse};
 use crate::foundation::grid::Grid;
 
-/// Shares of a bent patch's side that are tried if the field bends much.
+/// Fractions of the side of a bent patch that are tried in turn, until the field varies little enough inside the
+/// patch.
 const SHRINK: [f32; 4] = [1.0, 0.8, 0.65, 0.5];
 /// Maximum mean difference between the frame of the centre and the field in the inner part of a bent patch.
 const ADAPT: f32 = 0.7;
-/// Maximum difference between the frames of a bent patch and the field. Points above it are left to other patches.
+/// Maximum difference between the derivatives of a bent patch and the field. Points above it are left to other
+/// patches.
 const TORN: f32 = 0.45;
 /// Divisor of the patch side at a pole of the field, where patches are rigid.
 const POLE: f32 = 1.75;
@@ -151,7 +153,8 @@ impl<const D: usize> Chart<D> {
         ))
     }
 
-    /// Returns the affine chart of a frame over a window: of a patch with this side, or of the whole window.
+    /// Returns the affine chart of a frame over a window. The patch has the given side, or fills the window if there
+    /// is none.
     pub(super) fn affine(
         window: Window<D>,
         canvas: &Canvas<D>,
@@ -211,7 +214,8 @@ impl<const D: usize> Chart<D> {
         let Frames::Dense(all) = frames else {
             return None;
         };
-        // Integrate the frames on a coarse lattice, once for each exemplar axis, and interpolate.
+        // Integrate the frames on a coarse lattice, once for each exemplar axis, and interpolate the potentials at the
+        // points.
         let mesh = Mesh::new(&window, all);
         let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
         let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };

@@ -1,8 +1,8 @@
-//! Patches that are cut into a part of an unbounded output, which earlier layers have covered.
+//! Patches that are inserted into a part of an unbounded output that earlier layers have covered.
 //!
-//! Boxes of one layer tile the world, and each box is cut into the result of the layer before. Points at the ends of a
-//! box do not change, so that neighbouring boxes fit. The result depends only on the content of the box before the cut
-//! and on the field inside the box.
+//! Boxes of one layer tile the world, and patches are inserted into each box of the result of the layer before. Points
+//! at the ends of a box do not change, so that neighbouring boxes fit. The result depends only on the content of the
+//! box before the cuts and on the field inside the box.
 
 use std::collections::HashMap;
 
@@ -22,18 +22,18 @@ use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
-/// Minimum share of a box that one patch must fill. Other boxes are divided.
+/// Minimum fraction of a box that one patch must fill. Other boxes are divided.
 const FILLED: f64 = 0.5;
 /// Maximum mean difference between a patch and the field. A box with a larger difference is divided along the axes of
-/// the largest changes of the field. An axis along which the box shows half of a patch or less is not divided. The
-/// result is a few slabs between folds instead of many cubes.
+/// the largest changes of the field. It then becomes a few slabs instead of many cubes. An axis along which the box
+/// shows half of a patch or less is not divided.
 const STRAY: f32 = 0.2;
 /// Side of the patches that determine how many seams are covered again, relative to the longest side of the part.
 /// [`STEP`] is the distance between these patches, relative to their side.
 const OF_PART: f32 = 0.8;
 const STEP: f32 = 0.6;
-/// Windows with more points are first cut between blocks of this side. In these windows more points have a choice than
-/// in others, so the largest windows start with larger blocks than in [`LARGE`].
+/// Numbers of points, and sides of blocks. Windows with more points are first cut between blocks of this side. In
+/// these windows more points have a choice than in other cuts, so the largest windows start with larger blocks.
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Minimum side of a box that is divided.
 const SMALL: usize = 12;
@@ -52,7 +52,7 @@ impl<const D: usize> Prepared<D> {
     }
 }
 
-/// Content of a part.
+/// Content of a part of an unbounded output.
 #[derive(Debug, Clone)]
 pub struct Shown<const D: usize> {
     /// Exemplar coordinates of each point.
@@ -107,8 +107,8 @@ pub fn judge<const D: usize>(
     Ok(seams)
 }
 
-/// Cuts patches into all of a part except its ends: one patch if the exemplar is large enough to fill the part, else
-/// several.
+/// Inserts patches into a part, except at its ends, which do not change. One patch is inserted if the exemplar is
+/// large enough to fill the part, otherwise several.
 ///
 /// # Errors
 /// Returns an error if options are out of their range, sizes of arrays do not match the region, or the monitor was
@@ -169,8 +169,8 @@ impl<const D: usize> Stitching<'_, D> {
         }
     }
 
-    /// Cuts a patch into a box. If one patch would leave too much of the box unchanged, smaller boxes that overlap by
-    /// half are cut.
+    /// Inserts a patch into a box. If one patch would leave too much of the box unchanged, patches are inserted into
+    /// smaller boxes that overlap by half.
     fn cover(&mut self, low: [usize; D], high: [usize; D]) -> Result<()> {
         let Some(window) = self.window(low, high) else {
             return Ok(());
@@ -234,7 +234,7 @@ impl<const D: usize> Stitching<'_, D> {
         sums.map(|sum| sum >= 0.5 * most)
     }
 
-    /// Covers the worst seams again. Their number is a share of the number of patches that would fill the part.
+    /// Covers the worst seams again. Their number is a fraction of the number of patches that would fill the part.
     fn recover_part(&mut self) -> Result<()> {
         let shape = self.canvas.grid.shape();
         let scale = self.scale(shape.map(|n| n as i32 / 2));

@@ -1,5 +1,5 @@
-//! The cut of one patch into the canvas. It assigns points to the patch so that the resulting pairs of neighbours have
-//! the lowest total cost.
+//! The insertion of one patch into the canvas along a minimum cut. The cut assigns points to the patch so that the
+//! resulting pairs of neighbours have the lowest total cost.
 //!
 //! Kwatra et al. (SIGGRAPH 2003) compare the two images on both sides of a seam. This cut judges the two points that
 //! become neighbours: the kept point `p` and the taken point `q`. It can thus distinguish a joint between two elements
@@ -23,10 +23,11 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::maxflow::Solver;
 
-/// Windows with more points are first cut between blocks of this side, in cuts that are applied.
+/// Numbers of points, and sides of blocks. If a cut is applied, windows with more points are first cut between blocks
+/// of this side.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
-/// The same limits for cuts that are only compared. For images under a field, larger blocks lose more quality than they
-/// save time.
+/// The same limits for cuts that are only compared. For images under a field, larger blocks would reduce the quality
+/// too much for the time that they save.
 const JUDGED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 
 /// A patch at a place.
@@ -65,7 +66,7 @@ struct Patch {
     looks: Looks,
     /// Squared difference of colours between the patch and the current content.
     apart: Vec<f32>,
-    /// 1 if the patch shows the current sample, else 0.
+    /// 1 for points where the patch shows the current sample, else 0.
     same: Vec<f32>,
     /// Whether the patch shows the current sample at any point.
     meets: bool,
@@ -115,8 +116,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the content of a window before a patch with a mask is cut in. Points of the core must take the patch; an
-    /// empty core has no points.
+    /// Returns the content of a window before a patch with a mask is inserted. Points of the core must take the patch.
+    /// `core` may be empty.
     pub(super) fn view(
         &self,
         canvas: &Canvas<D>,
@@ -178,7 +179,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         places.iter().enumerate().map(cost).collect()
     }
 
-    /// Cuts a patch into the canvas.
+    /// Returns the cut that inserts a patch into the canvas.
     pub(super) fn cut(
         &self,
         view: &View<D>,
@@ -190,7 +191,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine(view, patch, coarse, monitor)
     }
 
-    /// Cuts a patch between blocks of points, which is precise enough for a comparison.
+    /// Returns the cut of a patch between blocks of points, which is precise enough to compare patches.
     pub(super) fn judge(
         &self,
         view: &View<D>,
@@ -215,7 +216,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine(view, patch, judged, monitor)
     }
 
-    /// Cuts a patch between blocks of a given side.
+    /// Returns the cut of a patch between blocks of a given side.
     pub(super) fn cut_between(
         &self,
         view: &View<D>,
@@ -226,7 +227,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.solve(view, patch, &view.ties, block, monitor)
     }
 
-    /// Refines a coarse cut: the side of the blocks is halved until it is 1. Only points near the cut are free.
+    /// Refines a coarse cut by halving the side of the blocks until it is 1. Only points near the cut are free.
     pub(super) fn refine(
         &self,
         view: &View<D>,
@@ -237,8 +238,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.refine_within(view, patch, coarse, 0, monitor)
     }
 
-    /// Refines a coarse cut. Points within `reach` steps of the cut are free, or within the side of a block if this is
-    /// more.
+    /// Refines a coarse cut. Points are free within `reach` steps of the cut, or within the side of a block if this is
+    /// larger.
     pub(super) fn refine_within(
         &self,
         view: &View<D>,
@@ -275,7 +276,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         Ok(best)
     }
 
-    /// Returns the minimum cut between blocks of a side.
+    /// Returns the minimum cut between blocks of a given side.
     fn solve(
         &self,
         view: &View<D>,
@@ -406,8 +407,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
             let kept = &view.seams[run.axis];
             for k in 0..run.n {
                 let (p, q) = (run.p + k, run.q + k);
-                // A seam exists only where one of two points takes the patch. It is judged again, because the energy
-                // has rounded costs.
+                // A seam exists only where one of two points takes the patch. Compute its cost again, because the
+                // energy contains rounded costs.
                 let cost = match (take[p], take[q]) {
                     (false, false) => continue,
                     (true, true) => 0.0,

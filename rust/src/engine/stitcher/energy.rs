@@ -1,8 +1,8 @@
 //! The energy of a cut, and its minimum: exact, or among the cuts between blocks of points.
 //!
-//! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005. Large
-//! windows are first cut between blocks, and then only points along that cut are free. Otherwise these windows would
-//! take most of the time.
+//! The method is by Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*,
+//! ICCV 2005. Large windows are first cut between blocks, and then only points along that cut are free. Otherwise
+//! these windows would take most of the time.
 
 use super::pair::{Capacities, capacity};
 use super::runs::Run;
@@ -23,8 +23,8 @@ pub(super) struct Energy<const D: usize> {
     terminal: Vec<i32>,
     /// Cost if a block is kept and the next block along the axis is taken.
     forward: [Vec<i32>; D],
-    /// Cost if a block is taken and the next block is kept. This cost could be in the terminals, but would then flow
-    /// from block to block. The cut would be the same and take twice the time.
+    /// Cost if a block is taken and the next block is kept. It could be included in the terminals, but would then have
+    /// to flow from block to block. The cut would be the same and take twice the time.
     backward: [Vec<i32>; D],
 }
 
@@ -118,7 +118,8 @@ impl<const D: usize> Energy<D> {
             match (ties[run.p + k], ties[run.q + k]) {
                 // A seam inside a block is replaced with the block; see `add_seams`.
                 (Tie::Either, Tie::Either) if p != q => {
-                    // Put half of the cost of the old seam on each direction, as far as each direction costs that much.
+                    // Subtract half of the cost of the old seam from each direction, or less from a direction that
+                    // costs less than this.
                     let both = old_new + new_old - kept;
                     let ahead = (old_new - kept / 2).clamp(0, both);
                     let back = both - ahead;
@@ -136,7 +137,7 @@ impl<const D: usize> Energy<D> {
         }
     }
 
-    /// Adds the seams of a run inside blocks, which disappear if the block takes the patch.
+    /// Adds the seams of a run that are inside blocks. They disappear if the block takes the patch.
     pub(super) fn add_seams(&mut self, ties: &[Tie], run: &Run, seams: &[f32]) {
         let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
         for (k, &seam) in seams.iter().enumerate().filter(|(_, s)| **s > 0.0) {

@@ -1,7 +1,7 @@
 //! Filling: patches around a lattice of centres, and then around all points that are still empty.
 //!
-//! Patches whose windows do not overlap are searched at the same time. These patches depend only on the field, not on
-//! the number of threads.
+//! Patches whose windows do not overlap are searched at the same time. Their choice depends only on the field, so the
+//! result does not depend on the number of threads.
 
 use std::collections::VecDeque;
 
@@ -13,7 +13,7 @@ use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 
-/// A patch is skipped if all points within this share of the step around its centre are covered.
+/// A patch is skipped if all points within this fraction of the step around its centre are covered.
 const CORE: f32 = 0.45;
 /// Number of points where the enlargement of a field is measured.
 const PROBES: usize = 4096;
@@ -131,7 +131,7 @@ impl<const D: usize> Stitching<'_, D> {
         })
     }
 
-    /// Applies patches around points that are still empty.
+    /// Inserts patches around points that are still empty.
     fn fill_gaps(&mut self) -> Result<()> {
         let grid = self.canvas.grid;
         let mut next = 0;
@@ -146,7 +146,8 @@ impl<const D: usize> Stitching<'_, D> {
                 }
             }
             if self.canvas.free == before || !self.canvas.covered(p as u32) {
-                // This chart does not contain its own centre, so any sample is shown there as a patch of one point.
+                // No chart around this point contains the point, so it shows an arbitrary sample, as a patch of one
+                // point.
                 self.canvas.patches[p] = self.patches.len() as u32;
                 self.canvas.free -= 1;
                 self.patches.push(Patch {
@@ -161,7 +162,7 @@ impl<const D: usize> Stitching<'_, D> {
         Ok(())
     }
 
-    /// Cuts in the best patch around a point.
+    /// Inserts the best patch around a point.
     fn cover_around(&mut self, centre: [i32; D], side: f32) -> Result<()> {
         match self.chart(centre, side) {
             Some(chart) => self.cover_chart(chart, centre, side),
@@ -169,7 +170,7 @@ impl<const D: usize> Stitching<'_, D> {
         }
     }
 
-    /// Cuts in the best patch of a chart.
+    /// Inserts the best patch of a chart.
     pub(super) fn cover_chart(
         &mut self,
         chart: Chart<D>,

@@ -1,7 +1,7 @@
-//! Patches that are not transformed, cut into a window that another search has filled.
+//! Unwarped patches that are inserted into a window, which another search has filled.
 //!
-//! Places are numbers of samples in one row, which may come from several images. The neighbours of a sample are not
-//! used.
+//! A place is the number of a sample in one row of samples, which may come from several images. The neighbours of a
+//! sample in the row are not used.
 
 use super::canvas::{FREE, Window};
 use super::cut::{Cutter, Cutting, Proposal};
@@ -17,10 +17,11 @@ use crate::{Error, Result};
 /// Number of samples in a line of the grid. Samples are arranged in lines because one coordinate has too few bits for
 /// their numbers.
 const LINE: usize = 1 << 14;
-/// Windows with more points are cut between blocks of this side, both to compare and to apply a patch.
+/// Numbers of points, and sides of blocks. Windows with more points are cut between blocks of this side, to compare
+/// patches (`JUDGED`) or to insert a patch (`CUT`).
 const JUDGED: (usize, usize) = (1 << 12, 4);
 const CUT: (usize, usize) = (1 << 15, 2);
-/// Maximum distance from a cut between blocks of the points that are cut again one by one.
+/// Points up to this distance from a cut between blocks are cut again one by one.
 const REACH: usize = 8;
 
 /// A window of an output, and the points that a patch may take. All arrays have one entry per point.
@@ -38,7 +39,7 @@ pub struct Pasting<'a> {
     pub core: &'a [bool],
 }
 
-/// A patch, cut into a window.
+/// The result of the insertion of a patch into a window.
 #[derive(Debug, Clone)]
 pub struct Pasted {
     /// Whether each point takes the patch.
@@ -47,7 +48,7 @@ pub struct Pasted {
     pub seams: Vec<[f32; 2]>,
 }
 
-/// Source of patches: samples in a row.
+/// A row of samples that patches consist of.
 #[derive(Debug, Clone)]
 pub struct Samples {
     source: Source<2>,
@@ -79,8 +80,9 @@ impl Samples {
         })
     }
 
-    /// Returns the cost of the seams of a window after each patch alone is cut into it. A patch is the sample that each
-    /// point would show. Large patches are cut between blocks of points, which is precise enough for a comparison.
+    /// Returns the cost of the window's seams after only one patch is inserted, separately for each of the patches. A
+    /// patch contains the sample that each point would show. Large patches are cut between blocks of points, which is
+    /// precise enough to compare them.
     ///
     /// # Errors
     /// Returns an error if sizes of arrays do not match the window, samples do not exist, or the monitor was
@@ -111,7 +113,7 @@ impl Samples {
         self.count == 0
     }
 
-    /// Cuts in the patch with the lowest cost of [`Self::judge`]. Returns its number also.
+    /// Inserts the patch that `choose` selects from the costs of [`Self::judge`]. Returns its number and the result.
     ///
     /// # Errors
     /// Returns the same errors as [`Self::judge`].
@@ -143,7 +145,8 @@ impl Samples {
         Ok((chosen, paste(pasting, cut)))
     }
 
-    /// Cuts a patch into a window between any of its points, or between blocks if the window is very large.
+    /// Inserts a patch into a window along the minimum cut between its points. If the window is very large, the cut is
+    /// first computed between blocks.
     ///
     /// # Errors
     /// Returns the same errors as [`Self::judge`].
@@ -222,7 +225,7 @@ impl Samples {
         Err(Error::value(
             argument,
             format!(
-                "must be below the number of samples, {}, got {sample}",
+                "must be below the number of samples ({}), got {sample}",
                 self.count
             ),
         ))
@@ -295,7 +298,7 @@ mod tests {
     }
 
     proptest! {
-        /// The cut judges the pairs that result, and covered seams disappear.
+        /// The cut has the lowest cost of the resulting pairs, and covered seams disappear.
         #[test]
         fn the_cut_is_the_least_of_all(seed in 0u64..500) {
             let samples = samples(seed, WEIGHTS);

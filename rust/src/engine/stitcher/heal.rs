@@ -171,7 +171,7 @@ impl<const D: usize> Stitching<'_, D> {
         counts.get(&key).copied().unwrap_or(0) as f64 / self.size(key).max(1.0)
     }
 
-    /// Returns the cost of an instance with a number of points.
+    /// Returns the cost of an instance that shows `count` points.
     fn lack(&self, key: Key, count: i64) -> f64 {
         LACK * (count as f64).min((self.size(key) - count as f64).max(0.0))
     }
@@ -298,7 +298,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !core.contains(&true) {
             return Ok(None);
         }
-        // Cut the patch in, and count the points that each instance gains or loses.
+        // Insert the patch on trial, and count the points that each instance gains or loses.
         let view = (self.cutter).view(canvas, &chart.window, &chart.mask, &core);
         let cutting = self.cutter.cut(&view, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();

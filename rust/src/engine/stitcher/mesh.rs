@@ -6,7 +6,7 @@ use crate::foundation::grid::Grid;
 
 /// Number of intervals along an axis of the coarse lattice that a bent chart is integrated on.
 const NODES: usize = 16;
-/// Maximum number of steps of conjugate gradients. They converge long before.
+/// Maximum number of steps of conjugate gradients, which converge much earlier.
 const STEPS: usize = 60;
 
 /// A coarse lattice over a window, with the frames at its nodes.
@@ -50,7 +50,7 @@ impl<const D: usize> Mesh<D> {
                 }
             }
         };
-        // The wanted difference of two nodes, from the mean of their frames.
+        // The wanted difference of the potential between two nodes follows from the mean of their frames.
         let slope = |axis: usize, i: usize, j: usize| {
             let both = f64::from(self.frames[i][row][axis]) + f64::from(self.frames[j][row][axis]);
             both * 0.5 / f64::from(ONE) * self.spacing[axis]
@@ -76,7 +76,7 @@ impl<const D: usize> Mesh<D> {
             .collect();
         let (mut residual, mut image) = (vec![0.0; n], vec![0.0; n]);
         apply(&x, &mut image);
-        // The residual is the right-hand side minus the operator at the start.
+        // The residual is the right-hand side minus the operator applied to the start.
         edges(&mut |axis, i, j| {
             let d = slope(axis, i, j) * weight(axis);
             residual[j] += d;

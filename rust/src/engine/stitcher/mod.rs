@@ -3,7 +3,8 @@
 //! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre.
 //! 2. *search*: the difference between the patch and the known points is computed for all exemplar coordinates at
 //!    once.
-//! 3. *cut*: minimum cuts insert the best few candidates. They judge the pairs that result, and the cheapest is kept.
+//! 3. *cut*: minimum cuts insert the best few candidates. They judge the pairs that result, and the cheapest result is
+//!    kept.
 //! 4. *recover*: other patches are tried over the worst seams.
 //! 5. *heal*: torn elements are completed or removed.
 //!
@@ -11,7 +12,7 @@
 //! departures. Patches follow a field. A cut judges the pair that results instead of the difference of two images.
 //! Cuts and healing use the elements.
 //!
-//! [`Samples`] offers only the third step, for patches that are not transformed and come from another search.
+//! [`Samples`] offers only the third step, for unwarped patches that another search has found.
 
 mod balance;
 mod canvas;
@@ -57,9 +58,9 @@ pub use weights::Weights;
 pub struct Options {
     /// Side of a patch, in samples of the exemplar.
     pub patch: f32,
-    /// Overlap of neighbouring patches, as a share of their side.
+    /// Overlap of neighbouring patches, as a fraction of their side.
     pub overlap: f32,
-    /// Number of candidates that are cut in for each patch. The cheapest is kept.
+    /// Number of candidates that are tried for each patch. The candidate with the cheapest cut is kept.
     pub candidates: usize,
     /// If true, patches bend with the field. Otherwise they are rotated and scaled as a whole.
     pub bend: bool,
@@ -69,10 +70,10 @@ pub struct Options {
     pub repetition: f32,
     /// Cost of a patch that continues a neighbour exactly.
     pub continuation: f32,
-    /// Cost of points of classes that are more frequent than in the exemplar. The unit is a number of points equal to a
-    /// patch's side.
+    /// Cost of points whose classes are more frequent than in the exemplar. It is the cost of n such points, where n
+    /// is the side of a patch.
     pub balance: f32,
-    /// Number of the worst seams that are covered again, as a share of the number of patches.
+    /// Number of the worst seams that are covered again, relative to the number of patches.
     pub recover: f32,
     /// If true, torn elements are healed.
     pub heal: bool,
@@ -80,7 +81,7 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Points that are given: none, or one flag and one place per point.
+/// Points that are given. There are none, or the arrays have one flag and one place for each point.
 #[derive(Debug, Clone, Copy)]
 pub struct Given<'a, const D: usize> {
     /// True for each given point.
@@ -116,10 +117,10 @@ pub struct Stitched<const D: usize> {
     pub healed: usize,
 }
 
-/// A patch that has been cut in.
+/// A patch that has been inserted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch<const D: usize> {
-    /// Its centre on the canvas.
+    /// Centre on the canvas.
     pub centre: [i32; D],
     /// Exemplar coordinates of the centre.
     pub place: Place<D>,
@@ -127,7 +128,7 @@ pub struct Patch<const D: usize> {
     pub frame: Frame<D>,
     /// Whether the map of the patch is affine with that Jacobian. Otherwise it bends with the field.
     pub rigid: bool,
-    /// Its side, in samples of the exemplar.
+    /// Side, in samples of the exemplar.
     pub side: f32,
 }
 
@@ -138,7 +139,7 @@ impl<const D: usize> Patch<D> {
     }
 }
 
-/// The state of the work.
+/// The state of a stitching run.
 struct Stitching<'a, const D: usize> {
     cutter: Cutter<'a, D>,
     frames: Frames<'a, D>,
@@ -209,7 +210,7 @@ pub fn stitch<const D: usize>(
     this.recover(this.patches.len(), options.patch)?;
     let healed = if options.heal { this.heal()? } else { 0 };
     let mut canvas = this.canvas;
-    // Patches may exceed the end of a periodic axis, so wrap their coordinates.
+    // Patches may extend beyond the ends of periodic axes of the exemplar, so wrap the coordinates.
     for place in &mut canvas.places {
         *place = bring_around(source.grid(), *place);
     }
@@ -232,7 +233,7 @@ fn check<const D: usize>(
 ) -> Result<()> {
     let n = region.grid.len();
     frames.check(n)?;
-    // Points and places are both absent, or one for each point. Only `loose` may be absent by itself.
+    // Points and places are both empty, or have one entry for each point. Only `loose` may be empty by itself.
     let held = given.points.len();
     for (got, right) in [
         (held, held == 0 || held == n),
@@ -255,7 +256,7 @@ fn check<const D: usize>(
         return Err(Error::value(
             "patch",
             format!(
-                "must be from 4 to 4096 samples, with an overlap of at most 0.8, 1 to 64 candidates and a recover share of 0 to 4, got {options:?}"
+                "must be from 4 to 4096 samples, overlap from 0 to 0.8, candidates from 1 to 64, and recover from 0 to 4; got {options:?}"
             ),
         ));
     }
@@ -264,7 +265,7 @@ fn check<const D: usize>(
     if !charges.iter().all(|x| (0.0..=100.0).contains(x)) {
         return Err(Error::value(
             "weights",
-            format!("must be from 0 to 100, got {options:?}"),
+            format!("repetition, continuation and balance must be from 0 to 100, got {options:?}"),
         ));
     }
     Ok(())

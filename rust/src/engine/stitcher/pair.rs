@@ -1,7 +1,7 @@
 //! Costs of pairs of neighbouring points, for rows of pairs at once.
 //!
-//! All seam costs are defined here. Rows are judged term by term. Each term is one vectorised pass over buffers that
-//! stay in the first-level cache.
+//! All seam costs are defined here. The costs of a row are computed term by term. Each term is one vectorised pass
+//! over buffers that stay in the first-level cache.
 
 use super::source::{CHANNELS, Source};
 use super::view::Row;

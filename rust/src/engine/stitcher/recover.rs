@@ -1,4 +1,4 @@
-//! Recovery: other patches are tried over the worst seams. These patches need not fit the content around the seam.
+//! Recovery: other patches are tried over the worst seams. These patches need not fit the content next to the seam.
 //!
 //! The method is by Kwatra et al., section 3.1. The costs of old seams count, so a patch is kept only if it reduces
 //! the total.
@@ -8,13 +8,14 @@ use super::chart::Chart;
 use crate::Result;
 use crate::foundation::grid::Grid;
 
-/// Radius of the area around a seam where a patch need not fit, as a share of a patch's side.
+/// Radius of the area around a seam where a patch need not fit, as a fraction of a patch's side.
 const HOLE: f32 = 0.15;
-/// Side of a patch that covers a seam, as a share of the side of other patches.
+/// Side of a patch that covers a seam, as a fraction of the side of other patches.
 const SIDE: f32 = 0.6;
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Covers the worst seams again. Their number is a share of a number of patches with a given side.
+    /// Covers the worst seams again. Their number is `patches` times the option `recover`, and `patch` is the side of
+    /// the other patches.
     pub(super) fn recover(&mut self, patches: usize, patch: f32) -> Result<()> {
         let count = (self.options.recover * patches as f32).round() as usize;
         if count == 0 {

@@ -33,7 +33,7 @@ pub(super) fn runs<const D: usize>(grid: &Grid<D>, mut f: impl FnMut(Run)) {
     }
 }
 
-/// Returns the points that have a choice, and the points next to a point with another choice.
+/// Marks the points that have a choice, and the points next to a point with a different tie.
 pub(super) fn judged<const D: usize>(grid: &Grid<D>, ties: &[Tie]) -> Vec<bool> {
     let mut judged: Vec<bool> = ties.iter().map(|&t| t == Tie::Either).collect();
     runs(grid, |Run { p, q, n, .. }| {

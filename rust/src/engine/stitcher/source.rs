@@ -101,7 +101,7 @@ impl<const D: usize> Source<D> {
         if most > n {
             return Err(Error::value(
                 "labels",
-                format!("must be at most the number of samples, {n}, got {most}"),
+                format!("must be at most the number of samples ({n}), got {most}"),
             ));
         }
         let mut this = Self {
@@ -208,7 +208,7 @@ impl<const D: usize> Source<D> {
         self.sizes[element as usize]
     }
 
-    /// Returns the share of the samples in each class.
+    /// Returns the fraction of the samples in each class.
     pub(super) fn shares(&self) -> &[f64] {
         &self.shares
     }

@@ -321,7 +321,7 @@ fn what_is_given_stays_unless_it_is_loose() {
         assert!(shown != canvas::LOOSE || (points[p] && loose[p]));
         assert_ne!(shown, FREE);
     }
-    // Patches take many points if the samples around them are shown from another place.
+    // Patches take many loose points, because their samples do not fit the samples around them.
     let kept = made.patches.iter().filter(|&&p| p == canvas::LOOSE).count();
     assert!(kept < (0..24 * 24).filter(|p| p % 21 == 0).count());
 }

@@ -34,8 +34,8 @@ pub(super) struct View<const D: usize> {
 }
 
 impl<const D: usize> View<D> {
-    /// Returns the content of a window before a patch with a mask is cut in. Points of the core must take the patch; an
-    /// empty core has no points.
+    /// Returns the content of a window before a patch with a mask is inserted. Points of the core must take the patch.
+    /// `core` may be empty.
     pub(super) fn new(
         canvas: &Canvas<D>,
         window: &Window<D>,

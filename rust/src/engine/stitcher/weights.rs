@@ -9,9 +9,9 @@ pub struct Weights {
     pub colour: f32,
     /// Cost of two elements in contact, whatever their colours.
     pub contact: f32,
-    /// Cost of a jump of the depth, where an element is cut off.
+    /// Cost of a sudden change of the depth, which cuts off an element.
     pub jump: f32,
-    /// Cost of a seam inside an element, by the depth on both sides.
+    /// Cost of a seam inside an element, which grows with the depth on both sides.
     pub depth: f32,
     /// Cost of an element next to the border of another one, so that joints stay two samples wide.
     pub joint: f32,

@@ -6,7 +6,7 @@ use crate::engine::stitcher::chart::Chart;
 use crate::engine::stitcher::source::{Colour, Source};
 use crate::foundation::fixed::nearest;
 
-/// Maximum number of points that are compared, both of the known points and of the points with a constraint.
+/// Maximum number of known points, and of points with a constraint, that are compared.
 const POINTS: usize = 1024;
 
 /// Known points and constraints of a patch.
@@ -46,8 +46,8 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
     }
 
-    /// Returns the best coordinates near given ones, and their cost. Steps are halved, starting below the blocks of a
-    /// level.
+    /// Returns the best coordinates near `near`, and their cost. The search starts with steps of half a block of
+    /// `level`, and halves the steps.
     pub(super) fn settle(
         &self,
         near: [i32; D],

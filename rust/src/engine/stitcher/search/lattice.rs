@@ -7,7 +7,7 @@ use crate::foundation::grid::Grid;
 /// Exemplars with more samples are searched in blocks of samples.
 const LARGE: usize = 1 << 18;
 
-/// Blocks of samples, in arrays that have room for transforms.
+/// Blocks of samples, in arrays whose sides are suitable for Fourier transforms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lattice<const D: usize> {
     /// Grid of the blocks.

@@ -30,7 +30,7 @@ const APART: i32 = 3;
 const NEAR: i32 = 6;
 /// Minimum number of points of a neighbour that a candidate can continue.
 const FEW: u32 = 12;
-/// Range of random scores if no point is known. Windows that are not related differ by 2.
+/// Range of the random scores that are added if no point is known. For comparison, unrelated windows differ by 2.
 const CHANCE: f32 = 0.1;
 /// Maximum ratio of the count of a sample to the mean count.
 const OFTEN: f32 = 6.0;
@@ -89,7 +89,7 @@ impl<const D: usize> Index<D> {
         Self::over(self.grid, Arc::clone(&self.spectra), charges)
     }
 
-    /// Counts a patch of a side around a sample.
+    /// Counts a patch with a given side for the samples around its centre.
     pub(super) fn note(&mut self, place: Place<D>, side: f32) {
         let (centre, reach) = (nearest(place), side.ceil() as i32);
         let mut axes: Vec<Vec<(usize, f32)>> = Vec::with_capacity(D);
@@ -158,7 +158,7 @@ impl<const D: usize> Index<D> {
             (asked.as_ref()).map(|(asked, n)| (asked, 2.0 / (*n as f32 * UNRELATED))),
         );
         if points == 0 {
-            // No point is known, and many places satisfy the constraint equally well.
+            // If no point is known, many places satisfy the constraint equally well. Choose among them at random.
             for (k, score) in scores.iter_mut().enumerate() {
                 *score += CHANCE * noise.uniform([0x71, k as u32, 0, 0]) as f32;
             }

@@ -6,7 +6,7 @@ use crate::engine::stitcher::source::{CHANNELS, Source};
 use crate::foundation::fft::{Complex, Volumes};
 use crate::foundation::grid::Grid;
 
-/// Maximum distance of the levels of a constraint. Costs between levels are interpolated.
+/// Maximum difference of adjacent levels of the wanted value. Costs between levels are interpolated.
 const LEVEL: f32 = 160.0;
 
 type Spectrum = Vec<Complex<f32>>;
@@ -29,7 +29,7 @@ struct Squares {
 enum Asked {
     /// Spectra for squared differences.
     Squares(Squares),
-    /// Spectra for other costs: the cost of each sample if the first value of a level is requested.
+    /// Spectra for asymmetric costs. For each level of the wanted first value, the cost of each sample.
     Levels {
         /// The first level.
         low: f32,
@@ -103,7 +103,8 @@ impl<const D: usize> Spectra<D> {
         }
     }
 
-    /// Returns the cost of each shift without its constant part. Colours and constraints have a scale each.
+    /// Returns the cost of each shift without its constant part. The costs of colours and of constraints are each
+    /// multiplied by a scale.
     pub(super) fn scores(
         &self,
         colours: Option<(&Template, f32)>,
