@@ -25,7 +25,7 @@
 //! | [`poisson`] | images reconstructed from their differences, near given values |
 //! | [`distance`] | signed distances to the outlines of labelled pieces |
 //! | [`warp`] | source coordinates of the pixels of warped images and moved shapes -> `gather` |
-//! | [`gather`] | lookup of exemplars of any type through coordinates |
+//! | [`gather`] | interpolation of exemplars of any type at given coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
 //! | [`nearby`] | windowed sums of values that are given at a few points of an image |
 //! | [`smooth`] | smoothing of arrays along their axes, such as Gaussian blur |
@@ -45,9 +45,9 @@
 //! | [`guide`] | soft constraints on an output -> `appearance` |
 //! | [`blocks`] | patch-based initialisation: each cell gets a matching patch -> `appearance`, `guide` |
 //! | [`pyramid`] | upsampling of coordinates to the next resolution |
-//! | [`optimize`] | correction of coordinates until every window resembles one of the exemplar -> `appearance`, `guide` |
+//! | [`optimize`] | correction of coordinates until every window resembles a window of the exemplar -> `appearance`, `guide` |
 //! | [`stitcher`] | patches transformed by frames, cut along the least visible seams and healed -> `guide` |
-//! | [`quilt`] | patches of images, chosen one by one and cut in -> `stitcher` |
+//! | [`quilt`] | patches of images, chosen one by one and inserted along minimum cuts -> `stitcher` |
 //! | [`coherence`] | k-coherence: similarity sets, and correction among their candidates -> `appearance` |
 //!
 //! The topmost layer, `bindings`, is the Python module `texrs._rust` (feature `python`).

@@ -79,8 +79,8 @@ pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
     })
 }
 
-/// Values of the exemplar samples and of the output points, weights, samples sorted by value, and
-/// the weight of an excess in 1 / 256.
+/// Arrays of a guide: values of the exemplar samples and of the output points, weights, and samples
+/// sorted by value. The last number is the weight of an excess in units of 1/256.
 pub(super) type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
@@ -203,7 +203,7 @@ impl Appearance {
         gain: i64,
         spacing: i32,
     ) -> PyResult<Self> {
-        // Both dimensions read the same arrays, but the types of the parts differ.
+        // Use a macro, because the types of the parts differ although both read the same arrays.
         macro_rules! parts {
             () => {
                 Parts {
@@ -338,7 +338,8 @@ impl Appearance {
     }
 }
 
-/// Returns the coordinates of a region from those of the same region at half the resolution.
+/// Returns the coordinates of a region, computed from those of the same region at half the
+/// resolution.
 #[pyfunction]
 pub(super) fn upsample<'py>(
     py: Python<'py>,

@@ -11,8 +11,8 @@ use crate::foundation::memory;
 use crate::kernels::gather::{CHUNK, Element, Exemplar, Interpolation};
 use crate::{Error, Result};
 
-/// Looks up exemplars of one dtype at coordinates (pixels, axes). Exemplars have the shape (rows,
-/// columns, channels) or (planes, rows, columns, channels).
+/// Interpolates exemplars of one dtype at coordinates (pixels, axes). Exemplars have the shape
+/// (rows, columns, channels) or (planes, rows, columns, channels).
 #[pyfunction]
 pub(super) fn gather<'py>(
     py: Python<'py>,
@@ -33,7 +33,7 @@ pub(super) fn gather<'py>(
     }
     try_types!(u8, u16, f32, f64, i8, i16, i32, u32);
     Err(PyTypeError::new_err(
-        "exemplars: must all have the same dtype: uint8, uint16, float32, float64, int8, int16, int32 or uint32",
+        "exemplars: must all have the same dtype, one of uint8, uint16, float32, float64, int8, int16, int32, uint32",
     ))
 }
 
@@ -48,7 +48,11 @@ fn typed<'py, T: Element + numpy::Element>(
     match wrap.len() {
         2 => axes::<T, 2>(py, arrays, wrap, which, coordinates, interpolation),
         3 => axes::<T, 3>(py, arrays, wrap, which, coordinates, interpolation),
-        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
+        n => Err(Error::value(
+            "wrap",
+            format!("must have one flag for each of 2 or 3 axes, got {n}"),
+        )
+        .into()),
     }
 }
 
@@ -74,7 +78,7 @@ fn axes<'py, T: Element + numpy::Element, const D: usize>(
         .iter()
         .map(|a| exemplar(a, wrap))
         .collect::<Result<Vec<_>>>()?;
-    // All exemplars have the same number of channels, which the kernel checks.
+    // The kernel checks that all exemplars have the same number of channels.
     let channels = arrays
         .first()
         .and_then(|a| a.shape().last().copied())
@@ -102,7 +106,10 @@ fn exemplar<'a, T: Element + numpy::Element, const D: usize>(
     if shape.len() != D + 1 {
         return Err(Error::value(
             "exemplars",
-            format!("must have {} axes and channels, got shape {shape:?}", D),
+            format!(
+                "must have {} spatial axes and a channel axis, got shape {shape:?}",
+                D
+            ),
         ));
     }
     Exemplar::new(

@@ -29,7 +29,7 @@ pub(super) fn contour_strength<'py>(
     PyArray1::from_vec(py, found).reshape(shape)
 }
 
-/// Returns the region of each pixel, and the number of regions.
+/// Returns the watershed region of each pixel, and the number of regions.
 #[pyfunction]
 pub(super) fn watershed_regions<'py>(
     py: Python<'py>,
@@ -81,7 +81,7 @@ type Candidates<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Returns the nodes of several merge trees of regions. A row of `costs` is (arcs, means, small).
+/// Returns the nodes of several merge trees of regions. Each row (arcs, means, small) of `costs` gives one tree.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
 pub(super) fn region_candidates<'py>(
@@ -126,7 +126,7 @@ fn sets(starts: &[i64], members: &[u32]) -> Result<Sets> {
 
 /// Returns the measures of sets of regions, one row per set. Three sums along the outer border and three sums of
 /// borders inside come first. Then follow the areas of the convex hull and of the smallest rectangle, the extent and
-/// the contrast. The last one is the share of the border that looks alike on both sides.
+/// the contrast. The last one is the fraction of the border whose two sides look similar.
 #[pyfunction]
 pub(super) fn measure_regions<'py>(
     py: Python<'py>,
@@ -150,7 +150,7 @@ pub(super) fn measure_regions<'py>(
             _ => {
                 return Err(Error::value(
                     "extremes",
-                    format!("must have {DIRECTIONS} points a row"),
+                    format!("must have {DIRECTIONS} points for each region"),
                 )
                 .into());
             }
@@ -186,7 +186,7 @@ pub(super) fn sum_regions<'py>(
     PyArray1::from_vec(py, found).reshape([sets.len(), columns])
 }
 
-/// Returns a flag for each set: whether it is chosen. The chosen sets are disjoint and have a large total worth.
+/// Returns whether each set is chosen. The chosen sets are disjoint, and their total worth is large.
 #[pyfunction]
 pub(super) fn choose_disjoint<'py>(
     py: Python<'py>,

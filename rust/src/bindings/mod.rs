@@ -1,5 +1,5 @@
-//! Python bindings. Only this folder names pyo3 and numpy. A function here checks only types,
-//! releases the interpreter, and calls a kernel.
+//! Python bindings. Only this folder uses pyo3 and numpy. A function here checks only types,
+//! releases the interpreter lock, and calls a kernel.
 
 mod appearance;
 mod coherence;
@@ -59,7 +59,8 @@ impl From<Error> for PyErr {
     }
 }
 
-/// Runs a kernel without the interpreter lock, in the pool that this thread has selected.
+/// Runs a kernel without the interpreter lock, in the thread pool that the calling thread has
+/// selected.
 ///
 /// Ctrl-C stops the kernel. If `progress` is given, it is called with the fraction that is done,
 /// and stops the kernel by raising. Otherwise the observers of the outer Python call are asked
@@ -89,7 +90,7 @@ fn run<R: Send>(
 }
 
 /// Runs a kernel like [`run`], but on the calling thread if `small` is true, because waking another
-/// thread would take longer. A small kernel must not distribute its work.
+/// thread would take longer. A small kernel must not use other threads.
 fn run_small<R: Send>(
     py: Python<'_>,
     small: bool,

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::{grouped, run};
 use crate::kernels::nearby;
 
-/// Returns, at each point, the sum of the values of all points under a separable window around it.
+/// Returns the weighted sum of the values of all points in a separable window around each point.
 #[pyfunction]
 pub(super) fn sum_nearby<'py>(
     py: Python<'py>,

@@ -40,7 +40,8 @@ pub(super) fn poisson<'py>(
     PyArray1::from_vec(py, out).reshape(shape)
 }
 
-/// Replaces the flow into each pixel (rows, columns, channels) by the solution.
+/// Replaces the flow into each pixel (rows, columns, channels) by the solution of the Poisson
+/// equation.
 #[pyfunction]
 pub(super) fn poisson_spread(
     py: Python<'_>,

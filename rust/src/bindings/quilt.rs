@@ -20,13 +20,13 @@ type PixelsIn<'py> = (
 );
 /// Size, wrapped axes, patch size, whether the images are regular, and the fixed axis.
 type OptionsIn = ([usize; 2], [bool; 2], [usize; 2], bool, Option<usize>);
-/// Start, extent, and overlap before and after, along rows and columns.
+/// Start, extent, overlap before and overlap after, along rows and columns.
 type WindowIn = [[usize; 4]; 2];
-/// The pixel number that each output pixel shows, and the number of its patch.
+/// The number of the pixel that each output pixel shows, and the number of its patch.
 type QuiltOut<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray2<u32>>);
 
-/// Stitches patches of images into a texture. The first window takes the patch at (image, row,
-/// column).
+/// Stitches patches of images into a texture. `first` contains the first window, and the image and
+/// position (row, column) of its patch.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python function
 pub(super) fn quilt<'py>(
@@ -39,7 +39,7 @@ pub(super) fn quilt<'py>(
     waves: Vec<Vec<WindowIn>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<QuiltOut<'py>> {
-    // Copy the arrays, because the kernel runs without the interpreter.
+    // Copy the arrays, because the kernel runs without the interpreter lock.
     let mut all = Vec::with_capacity(pictures.len());
     for (colours, lattice) in &pictures {
         all.push(Picture {

@@ -14,7 +14,8 @@ use crate::{Error, Result};
 /// Maximum number of points of a cut that runs on the calling thread.
 const SMALL: usize = 4096;
 
-/// The flat mask, the cost of the cut and the number of edges.
+/// The flattened mask of the pixels of the second image, the cost of the cut, and the number of
+/// edges that it crosses.
 type Cut<'py> = (Bound<'py, PyArray1<bool>>, f64, usize);
 
 fn cost(name: &str) -> Result<Cost> {
@@ -42,12 +43,19 @@ fn slices<'a, const D: usize>(
         .map(|a| a.as_slice())
         .collect::<std::result::Result<Vec<_>, _>>()?;
     all.try_into().map_err(|all: Vec<_>| {
-        Error::value("axes", format!("must have {D} arrays, got {}", all.len())).into()
+        Error::value(
+            "axes",
+            format!(
+                "must have one array for each of {D} axes, got {}",
+                all.len()
+            ),
+        )
+        .into()
     })
 }
 
-/// Cuts between images (..., channels) with masks (...). Old seams are three lists with one array
-/// for each axis: `kept`, `ab` and `ba`.
+/// Cuts between the images `a` and `b` (..., channels) with masks (...). Old seams are three lists
+/// with one array for each axis: `kept`, `ab` and `ba`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // the arguments of the Python wrapper
 pub(super) fn seam_cut<'py>(
@@ -77,7 +85,11 @@ pub(super) fn seam_cut<'py>(
     match wrap.len() {
         2 => call.run::<2>(py, &wrap),
         3 => call.run::<3>(py, &wrap),
-        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
+        n => Err(Error::value(
+            "wrap",
+            format!("must have one flag for each of 2 or 3 axes, got {n}"),
+        )
+        .into()),
     }
 }
 
@@ -191,7 +203,11 @@ pub(super) fn seam_labels<'py>(
     match wrap.len() {
         2 => axes::<2>(py, &unary, &forward, &backward, &wrap),
         3 => axes::<3>(py, &unary, &forward, &backward, &wrap),
-        n => Err(Error::value("wrap", format!("must have two or three axes, got {n}")).into()),
+        n => Err(Error::value(
+            "wrap",
+            format!("must have one flag for each of 2 or 3 axes, got {n}"),
+        )
+        .into()),
     }
 }
 

@@ -114,7 +114,7 @@ impl Stitcher {
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);
         let loose = loose.as_slice()?;
         let demand = slices(&demand)?;
-        // The source has two or three axes, and the types of its results differ.
+        // Use a macro, because the types of the results differ for two and three axes.
         macro_rules! stitched {
             ($source:expr) => {
                 run(py, progress, |monitor| -> Result<_> {
@@ -187,7 +187,8 @@ impl Stitcher {
         Ok(PyArray1::from_vec(py, seams))
     }
 
-    /// Cuts patches into a region that is already covered, except for its ends.
+    /// Inserts patches into a region that is already covered. The points at the ends of the region
+    /// do not change.
     #[allow(clippy::too_many_arguments)] // the arguments of the Python method
     fn cover<'py>(
         &self,
@@ -285,7 +286,7 @@ fn read<const D: usize>(row: &[i32]) -> Patch<D> {
     }
 }
 
-/// Returns the row of a patch.
+/// Returns the row of a patch, as [`read`] expects it.
 fn write<const D: usize>(patch: &Patch<D>) -> Vec<i32> {
     let frame = patch.frame.as_flattened().iter().map(|&x| i32::from(x));
     let mut row: Vec<i32> = patch
@@ -347,8 +348,8 @@ type PyReadonlyArray3In<'py> = numpy::PyReadonlyArray3<'py, i16>;
 #[pyclass(frozen)]
 pub(super) struct PatchSamples(pub(super) Samples);
 
-/// The shape of a window, its samples, its seams, the points that a patch covers, and the points
-/// that must take the patch.
+/// The shape of a window, the sample that each point shows, and the seams. Then masks of the points
+/// that a patch covers, and of the points that must take it.
 type PastingIn<'py> = (
     [usize; 2],
     PyReadonlyArray1<'py, u32>,

@@ -25,7 +25,8 @@ fn out<'py>(py: Python<'py>, warped: Warped) -> PyResult<WarpedOut<'py>> {
     ))
 }
 
-/// Draws the dense mesh of `source` pixels at the target positions.
+/// Draws a dense mesh at its target positions. The mesh has one point for each pixel of an image of
+/// the shape `source`.
 #[pyfunction]
 pub(super) fn warp_mesh<'py>(
     py: Python<'py>,

@@ -26,7 +26,7 @@ pub enum Error {
         got: Vec<usize>,
     },
     /// The call needs more memory or more pixels than the limit.
-    #[error("{what} needs {needed}, more than the limit of {limit}")]
+    #[error("{what}: needs {needed}, more than the limit of {limit}")]
     Limit {
         /// Name of the requested result.
         what: String,

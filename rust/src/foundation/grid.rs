@@ -26,7 +26,7 @@ impl<const D: usize> Grid<D> {
             points = points.checked_mul(n).ok_or_else(|| {
                 Error::value(
                     "shape",
-                    format!("must have a number of points that fits 64 bits, got {shape:?}"),
+                    format!("must have a number of points that fits into 64 bits, got {shape:?}"),
                 )
             })?;
         }

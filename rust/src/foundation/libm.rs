@@ -1,7 +1,7 @@
 //! Functions with the same values on every machine.
 //!
 //! The standard library calls the system's functions, whose code and rounding depend on the
-//! processor. Only this file names libm.
+//! processor. Only this file uses libm.
 
 pub(crate) use ::libm::{exp, pow, sincos};
 

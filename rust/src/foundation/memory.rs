@@ -11,7 +11,7 @@ pub(crate) fn filled<T: Clone>(what: &str, value: T, len: usize) -> Result<Vec<T
     Ok(vec![value; len])
 }
 
-/// Returns a copy of an array that the bindings may not keep. `what` names it in the error.
+/// Returns a copy of an array that belongs to the Python caller. `what` names it in the error.
 #[cfg(feature = "python")]
 pub(crate) fn copied<T: Copy>(what: &str, values: &[T]) -> Result<Vec<T>> {
     check::<T>(what, values.len())?;
@@ -63,7 +63,12 @@ pub(crate) fn product(what: &'static str, sizes: &[usize]) -> Result<usize> {
     let all = sizes
         .iter()
         .try_fold(1usize, |n, &size| n.checked_mul(size));
-    all.ok_or_else(|| Error::value(what, format!("the product of {sizes:?} must fit 64 bits")))
+    all.ok_or_else(|| {
+        Error::value(
+            what,
+            format!("the product of {sizes:?} must fit into 64 bits"),
+        )
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Threads: a pool that belongs to the process, fixed chunks, progress and cancellation.
 //!
-//! Only this file names rayon. Its global pool is never used, because threads do not survive a
+//! Only this file uses rayon. Its global pool is never used, because threads do not survive a
 //! `fork` and a child that inherits a pool waits forever. The pools of this module are keyed by the
 //! process id, built on first use and never dropped.
 
@@ -58,7 +58,7 @@ fn pool(threads: usize) -> Result<&'static ThreadPool> {
                         .thread_name(|i| format!("texrs-{i}"))
                         .build()
                         .map_err(|e| {
-                            Error::value("threads", format!("cannot start {threads}: {e}"))
+                            Error::value("threads", format!("cannot start {threads} threads: {e}"))
                         })?,
                 };
                 let link = Box::new(Link {

@@ -1,15 +1,15 @@
 //! Principal components of many samples.
 //!
 //! Only the leading components are computed, by subspace iteration (Golub and Van Loan, *Matrix
-//! Computations*, section 8.2) on the covariance. This takes a few products with a thin matrix
-//! instead of a full decomposition. The start vectors are hashed, sums have a fixed order, and the
-//! largest entry of each component is made positive. The same samples therefore always give the
-//! same axes.
+//! Computations*, section 8.2) with the covariance matrix. This takes a few products with a thin
+//! matrix instead of a full decomposition. The start vectors are hashed, sums have a fixed order,
+//! and the largest entry of each component is made positive. The same samples therefore always give
+//! the same axes.
 
 use crate::foundation::hash::Noise;
 use crate::foundation::par;
 
-/// Number of products with the covariance. Relevant components have converged long before.
+/// Number of products with the covariance matrix. Relevant components converge much earlier.
 const ROUNDS: usize = 24;
 /// Number of vectors that are iterated in addition to the requested ones. They make the last
 /// requested vectors converge faster.

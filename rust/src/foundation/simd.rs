@@ -1,11 +1,11 @@
-//! SIMD code, chosen at run time. Only this file names pulp, and only this file contains unsafe
+//! SIMD code, chosen at run time. Only this file uses pulp, and only this file contains unsafe
 //! code. No operation is fused or reordered, so the values equal those of plain code.
 
 #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(crate) use pulp::{cast, x86::V3};
 
-/// Runs `work` compiled for AVX2 if the CPU supports it. Only inlined code is compiled so: the
-/// closure and the functions that it calls should be `#[inline(always)]`.
+/// Runs `work` compiled for AVX2 if the CPU supports it. Only inlined code is compiled for AVX2, so
+/// the closure and the functions that it calls should be `#[inline(always)]`.
 #[allow(unsafe_code)] // called only if the CPU has the feature
 #[inline]
 pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
@@ -101,7 +101,7 @@ pub(crate) use widest_fn;
 macro_rules! four {
     ($($name:ident $instruction:ident $operator:tt),*) => {$(
         /// Applies the operator to four pairs of numbers by one instruction, which all x86-64
-        /// processors have. On its own, the compiler often computes them one by one in functions
+        /// processors have. Otherwise the compiler often computes the pairs one by one in functions
         /// with more values than registers.
         #[allow(unsafe_code)] // arrays as registers
         #[inline(always)]

@@ -1,9 +1,9 @@
 //! Fourier transforms of lines of complex numbers and of real images and volumes. Only this folder
-//! names the FFT crate.
+//! uses the FFT crate.
 //!
-//! Transforms are not normalised. A forward transform followed by an inverse transform multiplies
-//! the values by the number of points. Two real lines are transformed together as one complex line (Press et al., *Numerical
-//! Recipes*, 12.3).
+//! Transforms are not normalised: a forward transform followed by an inverse transform multiplies
+//! the values by the number of points. Two real lines are transformed together as one complex line
+//! (Press et al., *Numerical Recipes*, 12.3).
 
 mod lanes;
 mod volumes;
@@ -52,8 +52,8 @@ impl<T: FftNum + Default> Lines<T> {
 }
 
 impl Lines<f32> {
-    /// Plans the transforms of `len` points with the fastest code for the processor, in half the
-    /// time.
+    /// Plans the transforms of `len` points with the fastest code for the processor, which takes
+    /// half the time.
     ///
     /// The last bits depend on the processor, so no result may depend on them. Only f32 is
     /// supported, because each further type would be compiled for every processor as well.

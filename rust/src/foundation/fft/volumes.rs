@@ -1,4 +1,4 @@
-//! Transforms of real volumes by all threads. An image is a volume whose planes have one row.
+//! Transforms of real volumes, on all threads. An image is a volume whose planes have one row.
 
 use super::{Complex, Lines, join, split};
 use crate::foundation::par;
@@ -22,8 +22,8 @@ impl Volumes {
         }
     }
 
-    /// Returns the smallest size of at least `n` that has only the prime factors 2, 3 and 5, whose
-    /// transform is fast.
+    /// Returns the smallest size of at least `n` that has only the prime factors 2, 3 and 5,
+    /// because its transform is fast.
     pub(crate) fn fast(n: usize) -> usize {
         let smooth = |mut m: usize| {
             for p in [2, 3, 5] {
