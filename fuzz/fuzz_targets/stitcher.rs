@@ -138,7 +138,7 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     }
 }
 
-/// Fuzzes `Samples`, whose unwarped patches are judged and cut into a window.
+/// Fuzzes `Samples`: unwarped patches are judged, and inserted into a window along minimum cuts.
 fn pasted(draw: &mut Draw<'_>) {
     let (count, channels) = (draw.within(0..=40), draw.within(0..=4));
     let colours = draw.reals(count * channels);
