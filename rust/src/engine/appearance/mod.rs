@@ -431,8 +431,8 @@ impl<const D: usize> Appearance<D> {
 }
 
 /// Returns the squared distance of two appearance vectors.
-// This function is not inlined. Next to bounds checks, the compiler would unroll it to scalar code. On its own, it
-// becomes a few SIMD instructions.
+// This function is not inlined. If it were inlined next to bounds checks, the compiler would unroll it into scalar
+// code. As a separate function, it becomes a few SIMD instructions.
 #[inline(never)]
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;

@@ -7,8 +7,8 @@ use crate::foundation::simd::wide_fn;
 /// Maps the colours of a window to its appearance vector.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Projection {
-    /// Number of values in a window, with the channels of each point together. `padded` is the length of a row of the
-    /// basis, rounded up to whole registers.
+    /// Number of values in a window, where the channels of a point are adjacent. `padded` is the length of a row of
+    /// the basis, rounded up to whole registers.
     pub(super) length: usize,
     pub(super) padded: usize,
     pub(super) basis: Vec<i16>,
@@ -48,7 +48,7 @@ impl Projection {
             .iter()
             .flatten()
             .fold(0.0f64, |m, x| m.max(x.abs()));
-        // A uniform exemplar has zero vectors.
+        // The vectors of a uniform exemplar are zero.
         if longest == 0.0 || components.variance <= FLAT {
             return Self {
                 length,

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// The arrays of an [`Appearance`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts<const D: usize> {
-    /// Samples along each axis, and which axes are periodic.
+    /// Number of samples along each axis, and flags of the periodic axes.
     pub grid: Grid<D>,
     /// Radius of the windows, in samples.
     pub radius: usize,

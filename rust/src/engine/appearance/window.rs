@@ -1,4 +1,4 @@
-//! Windows of an exemplar: their offsets, and the samples whose windows are inside.
+//! Windows of an exemplar: their offsets, and the samples whose windows are inside the exemplar.
 
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};

@@ -181,7 +181,7 @@ impl<const D: usize> Cells<D> {
                 }
             })
             .collect();
-        // The steps to all neighbours, and the same steps in row-major order.
+        // List the steps to all neighbours, and the same steps as offsets in row-major order.
         let steps: Vec<[i32; D]> = (0..3usize.pow(D as u32))
             .map(|mut k| {
                 std::array::from_fn(|_| {

@@ -100,7 +100,8 @@ impl<'a, const D: usize> Chooser<'a, D> {
         })
     }
 
-    /// Draws a place whose value is near the wanted one at the cell's centre.
+    /// Draws a place whose value is near the wanted value at the point `asked.middle`. Returns `None` if draws ignore
+    /// the guide.
     fn near(&self, asked: &Asked<'_, D>, noise: &Noise, round: u32, draw: u32) -> Option<Place<D>> {
         let word = noise.at(self.world, round << 16 | draw)[D];
         let sample = asked.guide?.near(asked.middle, word)?;
@@ -125,7 +126,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }
     }
 
-    /// Returns the best of the present place and the drawn ones. If costs are equal, the first place wins.
+    /// Returns the best of the present place and the drawn places. If costs are equal, the first place wins.
     #[allow(clippy::too_many_arguments)] // the surroundings, the guide, and how to choose
     pub(super) fn choose(
         &self,

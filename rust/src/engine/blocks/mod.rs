@@ -3,8 +3,8 @@
 //! Cells have about `cell` points on each side. Their centres are shifted by noise, and each point belongs to the
 //! nearest centre, so that seams are not straight. The patch of a cell is chosen to fit its neighbours. Cells of even
 //! and odd parity take turns, and each tries many places. The cost of a place compares its continuation outside the
-//! cell with the samples that are there. Plain squared differences would favour low-contrast patches, which are near
-//! every other patch on average. So they are divided by the contrast of both.
+//! cell with the samples that are shown there. Plain squared differences would favour low-contrast patches, which are
+//! near every other patch on average. The differences are therefore divided by the contrast of both patches.
 //!
 //! The result at a point depends only on world coordinates, and in each round only on cells up to two steps away.
 
@@ -26,8 +26,8 @@ use choose::Chooser;
 /// Number of points in a task.
 const CHUNK: usize = 4096;
 
-/// Limit of the side of a cell, of rounds, and of candidates in a round. Places of cells must fit into 32 bits, and
-/// the noise has 16 bits for the number of a draw.
+/// Limit of the side of a cell, of the number of rounds, and of the number of candidates in a round. Places of cells
+/// must fit into 32 bits, and the noise has 16 bits for the number of a draw.
 const MOST: usize = 1 << 16;
 
 /// Options of [`blocks`].
@@ -112,7 +112,8 @@ pub fn blocks<const D: usize>(
             });
         }
     }
-    // Include the spare memory of growing lists. The shell of a small cell has as many points as the cell.
+    // Estimate the bytes for each point, including the spare memory of growing lists. The shell of a small cell has as
+    // many points as the cell.
     let listed = 4 * D + 24 + 16 * D * (D + 1) / options.cell;
     memory::room("the cells of a region", region.grid.len(), listed)?;
     let mut places = memory::filled("the places of a region", [0; D], region.grid.len())?;

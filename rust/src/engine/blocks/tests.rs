@@ -153,7 +153,7 @@ fn choosing_makes_the_pieces_fit() {
 fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
     let exemplar = exemplar(false);
     let rows: Vec<[i16; 4]> = (0..1024).map(|i| [(i / 32 * 60) as i16, 0, 0, 0]).collect();
-    // One weight for all points, and only first values.
+    // All points have the same weight, and want only a first value.
     let (wanted, weight) = (vec![900; 1600], [256]);
     let order: Vec<u32> = (0..1024).collect();
     let region = Region::new(Grid::new([40; 2], [false; 2]).unwrap(), [0; 2]).unwrap();

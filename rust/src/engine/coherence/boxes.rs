@@ -5,17 +5,17 @@ use super::FEW;
 
 /// Number of vectors or boxes that are compared at a time.
 pub(super) const WIDTH: usize = 8;
-/// Number of pairs of numbers in a vector.
+/// Number of pairs of components in a shortened vector.
 const PAIRS: usize = FEW / 2;
 
-/// The first [`FEW`] numbers of [`WIDTH`] vectors. Each row has one pair of numbers of each vector, because the SIMD
-/// instruction multiplies and adds pairs.
+/// The first [`FEW`] components of [`WIDTH`] vectors. Each row has one pair of components of each vector, because the
+/// SIMD instruction multiplies and adds pairs.
 pub(super) type Block = [[i16; 2 * WIDTH]; PAIRS];
-/// The first [`FEW`] numbers of a vector, as pairs.
+/// The first [`FEW`] components of a vector, as pairs.
 pub(super) type Query = [[i16; 2]; PAIRS];
 /// A bit for each of eight distances, set if the distance is at most a limit, and the eight distances.
 pub(super) type Found = (u32, [i32; WIDTH]);
-/// The minimum and the maximum of each of the first [`FEW`] numbers.
+/// The minimum and the maximum of each of the first [`FEW`] components.
 pub(super) type Extent = [(i16, i16); FEW];
 
 /// Bounding boxes of up to eight sets of vectors, and the lowest vector number in each set.

@@ -61,7 +61,7 @@ pub(super) struct Level<'a, const D: usize, const N: usize> {
     kinds: Kinds<'a>,
     options: &'a Options,
     table: Table<D, N>,
-    /// The diagonals; `beside` contains the table offset of each.
+    /// Steps to the diagonal neighbours. `beside` contains the table offset of each step.
     diagonals: Vec<[i32; D]>,
     beside: Vec<i32>,
 }
@@ -111,7 +111,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             Frames::Dense(_) => None,
         };
         let classes = self.classes();
-        // The number of the turn, from 1, that last changed each point; 0 if none did.
+        // For each point, the number of the last turn that changed it, counted from 1, or 0 if no turn did.
         let mut changed = vec![0u32; places.len()];
         let turns = self.options.passes << D;
         monitor.expect(turns as u64);
@@ -214,8 +214,9 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         point: [usize; D],
         corners: &[Corner<D>; CORNERS],
     ) -> Place<D> {
-        // Collect the vectors that the diagonal neighbours inside the region show (Eq. 3), and their substitutes. Each
-        // step handles all neighbours, so that no read waits for the previous one.
+        // Collect the vectors that the diagonal neighbours inside the region show (Eq. 3 of the paper of
+        // `texrs.papers.solid`), and their substitutes. Each step handles all neighbours, so that no read waits for
+        // the previous one.
         let mut seen = [([0i16; N], 0i32); CORNERS];
         let mut rests = [[0; D]; CORNERS];
         let mut similar = [0u64; CORNERS * LARGEST];

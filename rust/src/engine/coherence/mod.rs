@@ -30,7 +30,7 @@ use crate::foundation::par;
 
 /// Number of points in a task.
 const CHUNK: usize = 1024;
-/// Length of shortened vectors, which fill one register. They are used if the leading numbers are sufficient.
+/// Length of shortened vectors, which fill one register. They are used if the leading components are sufficient.
 pub const FEW: usize = 8;
 /// Maximum number of samples in a similarity set.
 pub const LARGEST: usize = 16;
@@ -71,8 +71,8 @@ pub fn jitter<const D: usize>(
     Ok(())
 }
 
-/// The first `N` numbers of the vectors of all samples whose windows are inside the exemplar, with a margin of one
-/// sample. The margin wraps around periodic axes and repeats the border sample of the others.
+/// The first `N` components of the vectors of all samples whose windows are inside the exemplar, with a margin of one
+/// sample. The margin wraps around periodic axes and repeats the border sample along the others.
 struct Table<const D: usize, const N: usize> {
     low: [i32; D],
     strides: [i32; D],
@@ -114,7 +114,7 @@ impl<const D: usize, const N: usize> Table<D, N> {
         }
     }
 
-    /// Returns the table position of a sample whose window is inside.
+    /// Returns the table position of a sample whose window is inside the exemplar.
     #[inline(always)]
     fn at(&self, sample: [i32; D]) -> i32 {
         let mut at = 0;
@@ -136,7 +136,7 @@ fn first<const N: usize>(vector: &[i16; KEEP]) -> [i16; N] {
     std::array::from_fn(|k| vector[k])
 }
 
-/// Returns the squared distance of two vectors. They have 12 bits, so differences fit into 16.
+/// Returns the squared distance of two vectors. Components have 12 bits, so their differences fit into 16 bits.
 #[inline(always)]
 fn apart<const N: usize>(a: &[i16; N], b: &[i16; N]) -> i32 {
     let mut sum = 0;

@@ -1,4 +1,4 @@
-//! The arguments of a correction, their checks, and its start.
+//! The arguments of a correction, the checks of these arguments, and the start of the correction.
 
 use super::level::Level;
 use super::{CHUNK, FEW, LARGEST, Similarity};
@@ -87,7 +87,8 @@ pub fn correct<const D: usize>(
         check_shape(argument, &[wanted], length)?;
     }
     memory::room("the similarity sets", similarity.sets.len(), 8)?;
-    // Compute the flag once for each sample, because divisions are the costliest step here.
+    // Compute once for each sample whether its window is inside, because this needs divisions, the costliest step
+    // here.
     let inside: Vec<bool> = (0..samples)
         .map(|s| {
             let sample = appearance.grid().point(s).map(|x| x as i32);

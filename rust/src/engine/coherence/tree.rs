@@ -123,7 +123,7 @@ impl<const D: usize, const N: usize> Tree<D, N> {
     ) -> Nearest {
         let mut best = (i32::MAX, u32::MAX);
         let query = pairs(&first_few(vector));
-        // Scan the blocks of a leaf whose box is near enough.
+        // Scan those blocks of a leaf whose boxes are near enough.
         let scan = |leaf: usize, best: &mut Nearest| {
             let (mut near, _) = bounds(&self.levels[0][leaf], &query, best.0);
             while near != 0 {

@@ -38,7 +38,7 @@ use self::recent::Recent;
 const CHUNK: usize = 2048;
 /// Minimum spacing of an exemplar that costs are scaled by. Windows at a smaller distance count as equal.
 const FINEST: i32 = UNIT / 256;
-/// Points within this distance of a change, in points, are corrected again.
+/// Distance from a change, in points, up to which points are corrected again.
 const NEAR: usize = 1;
 /// Maximum of the options `acceptance` and `coherence`.
 const DEAREST: f64 = 1e6;
@@ -198,7 +198,7 @@ impl<const D: usize> Level<'_, D> {
             && (self.options.exhaustive || self.guide.is_some() || self.meet(places, p, point))
     }
 
-    /// Returns whether a neighbour of a point shows another patch than the point.
+    /// Returns whether a neighbour of a point shows a different patch.
     #[inline(always)]
     fn meet(&self, places: &[Place<D>], p: usize, point: [usize; D]) -> bool {
         let frame = self.frames.at(p);

@@ -19,7 +19,7 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// Starts without changes.
+    /// Creates flags without changes.
     pub(super) fn new(points: usize, radius: usize) -> Self {
         Self {
             radius,

@@ -19,8 +19,8 @@ struct Voter<const D: usize> {
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// Gives each point that a pass corrects the proposal nearest in colour to the weighted mean of all proposals. The
-    /// result is a copy, never an average.
+    /// Assigns a proposal to each point that a pass corrects. The colour of this proposal is the nearest to the
+    /// weighted mean of all proposals. The result is a copy, never an average.
     pub(super) fn vote(
         &self,
         places: &[Place<D>],

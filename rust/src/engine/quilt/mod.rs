@@ -96,10 +96,10 @@ pub struct Quilt<'a> {
 /// Properties of an image except its colours.
 struct Place {
     shape: [usize; 2],
-    /// Position of its first pixel among those of all images.
+    /// Position of the image's first pixel among the pixels of all images.
     first: usize,
     lattice: Option<[[f64; 2]; 2]>,
-    /// Offset from the place of its first patch in the image to the place in the texture.
+    /// Offset from the place of the first patch in the image to its place in the texture.
     step: Option<[f64; 2]>,
 }
 
@@ -224,7 +224,7 @@ impl<'a> Quilt<'a> {
         Ok(())
     }
 
-    /// Cuts a patch into each window of the waves.
+    /// Inserts a patch into each window of the waves.
     ///
     /// # Errors
     /// Returns an error if a window does not fit, or if the monitor was cancelled.
@@ -329,7 +329,7 @@ impl<'a> Quilt<'a> {
         let best = penalties.promising(CANDIDATES);
         let matches: Vec<Match> = best.iter().map(|&k| pool[k]).collect();
         let exact = self.refine(&matches, &colours, &known)?;
-        // Let the stitcher cut each candidate in, with a margin of one pixel for the gradients.
+        // Let the stitcher insert each candidate on trial, with a margin of one pixel for the gradients.
         let around = window.around(self.options.size, self.options.wrap);
         let points: Vec<usize> = around.bounds.points(self.options.size).collect();
         let shown: Vec<u32> = points.iter().map(|&i| self.place[i]).collect();
@@ -380,7 +380,7 @@ impl<'a> Quilt<'a> {
         colours
     }
 
-    /// Returns the colour of a pixel, by its position among those of all images.
+    /// Returns the colour of a pixel, by its position among the pixels of all images.
     fn colour(&self, place: usize) -> &[f32] {
         let which = self.pictures.partition_point(|p| p.first <= place) - 1;
         let at = (place - self.pictures[which].first) * self.channels;

@@ -3,8 +3,8 @@
 use super::{CELL, Quilt, Window};
 use crate::kernels::patch_search::Match;
 
-/// Penalty of a patch whose content all other patches show too, in units of the cost of a good match. Few places fit
-/// if elements are on a plain background. A larger penalty would then select patches that cut elements.
+/// Repetition penalty of a patch whose content all other patches also show, in units of the cost of a good match. Few
+/// places fit if elements are on a plain background. A larger penalty would then select patches that cut elements.
 const REPETITION: f64 = 10.0;
 /// Fraction of the matches that count as good.
 const GOOD: f64 = 0.1;

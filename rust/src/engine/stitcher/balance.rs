@@ -35,7 +35,7 @@ impl Balance {
         }
     }
 
-    /// Returns the balance after a patch was taken.
+    /// Returns the balance after points have taken a patch.
     pub(super) fn after<const D: usize>(
         &self,
         source: &Source<D>,

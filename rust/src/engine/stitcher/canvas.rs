@@ -14,7 +14,7 @@ pub(super) const HELD: u32 = u32::MAX - 1;
 /// Patch number of a given point that a patch may take.
 pub(super) const LOOSE: u32 = u32::MAX - 2;
 
-/// Returns whether the number of a point is the number of a patch.
+/// Returns whether a patch number refers to a patch, and is not [`FREE`], [`HELD`] or [`LOOSE`].
 #[inline(always)]
 pub(super) fn is_patch(patch: u32) -> bool {
     patch < LOOSE

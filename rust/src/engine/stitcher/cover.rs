@@ -32,8 +32,9 @@ const STRAY: f32 = 0.2;
 /// [`STEP`] is the distance between these patches, relative to their side.
 const OF_PART: f32 = 0.8;
 const STEP: f32 = 0.6;
-/// Numbers of points, and sides of blocks. Windows with more points are first cut between blocks of this side. In
-/// these windows more points have a choice than in other cuts, so the largest windows start with larger blocks.
+/// Pairs of a number of points and a side of blocks. Windows with more points are first cut between blocks of this
+/// side. In these windows more points have a choice than in other cuts, so the largest windows start with larger
+/// blocks.
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Minimum side of a box that is divided.
 const SMALL: usize = 12;

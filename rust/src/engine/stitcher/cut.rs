@@ -23,14 +23,14 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::maxflow::Solver;
 
-/// Numbers of points, and sides of blocks. If a cut is applied, windows with more points are first cut between blocks
-/// of this side.
+/// Pairs of a number of points and a side of blocks. If a cut is applied, windows with more points are first cut
+/// between blocks of this side.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
 /// The same limits for cuts that are only compared. For images under a field, larger blocks would reduce the quality
 /// too much for the time that they save.
 const JUDGED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 
-/// A patch at a place.
+/// A patch that is proposed for a window, at given exemplar coordinates.
 pub(super) struct Proposal<'a, const D: usize> {
     pub window: &'a Window<D>,
     pub mask: &'a [bool],
@@ -84,7 +84,7 @@ struct Costs {
 pub(super) struct Cutter<'a, const D: usize> {
     judge: Judge<'a, D>,
     pub guide: Option<&'a Guide<'a>>,
-    /// Windows with more points are first cut between blocks of this side. Larger limits come first.
+    /// Pairs of a number of points and a side of blocks, as in [`LARGE`]. Larger numbers come first.
     pub blocks: &'static [(usize, usize)],
     /// Buffers of the cuts that run at the same time.
     workspaces: Mutex<Vec<Workspace<D>>>,
@@ -157,7 +157,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         } else {
             0.0
         };
-        // Without costs of single points, skip the work for them.
+        // Return at once if single points have no costs.
         if presence <= 0.0 && self.guide.is_none() && distortion.is_empty() {
             return Vec::new();
         }
@@ -391,7 +391,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         });
     }
 
-    /// Returns the cut that gives the patch to some points.
+    /// Returns the cut that assigns the patch to the points in `take`.
     fn settle(
         &self,
         view: &View<D>,

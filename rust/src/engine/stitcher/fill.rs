@@ -19,7 +19,7 @@ const CORE: f32 = 0.45;
 const PROBES: usize = 4096;
 /// Maximum number of patches that are searched at the same time.
 const BATCH: usize = 4;
-/// Number of the next centres that are examined for these patches.
+/// Maximum number of centres that are examined to find these patches.
 const AHEAD: usize = 256;
 /// Minimum side in output points, in two and three dimensions, of a patch that the field shrinks. Without this
 /// minimum, there would be one patch for every few points near a horizon.
@@ -27,7 +27,7 @@ const SEEN: [f32; 2] = [24.0, 12.0];
 /// Maximum side of a patch that was enlarged to reach [`SEEN`], relative to the exemplar's shortest side.
 const LARGEST: f32 = 0.4;
 
-/// A patch that has been cut, but not applied yet.
+/// A patch whose cut has been computed, but not applied yet.
 pub(super) struct Found<const D: usize> {
     chart: Chart<D>,
     centre: [i32; D],

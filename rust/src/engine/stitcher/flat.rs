@@ -1,4 +1,4 @@
-//! Unwarped patches that are inserted into a window, which another search has filled.
+//! The insertion of unwarped patches, which another search has found, into a window.
 //!
 //! A place is the number of a sample in one row of samples, which may come from several images. The neighbours of a
 //! sample in the row are not used.
@@ -17,8 +17,8 @@ use crate::{Error, Result};
 /// Number of samples in a line of the grid. Samples are arranged in lines because one coordinate has too few bits for
 /// their numbers.
 const LINE: usize = 1 << 14;
-/// Numbers of points, and sides of blocks. Windows with more points are cut between blocks of this side, to compare
-/// patches (`JUDGED`) or to insert a patch (`CUT`).
+/// Pairs of a number of points and a side of blocks. Windows with more points are cut between blocks of this side, to
+/// compare patches (`JUDGED`) or to insert a patch (`CUT`).
 const JUDGED: (usize, usize) = (1 << 12, 4);
 const CUT: (usize, usize) = (1 << 15, 2);
 /// Points up to this distance from a cut between blocks are cut again one by one.
@@ -160,7 +160,7 @@ impl Samples {
     }
 
     fn cutter(&self) -> Cutter<'_, 2> {
-        // Each cut contains the side of its blocks.
+        // The list of block sides is empty, because each call of `cut_between` specifies the side.
         Cutter::new(&self.source, self.weights, None, &[])
     }
 

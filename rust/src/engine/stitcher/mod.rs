@@ -162,7 +162,7 @@ struct Stitching<'a, const D: usize> {
 /// # Errors
 /// Returns an error if options are out of their range, sizes of arrays do not match the region, or the monitor was
 /// cancelled.
-#[allow(clippy::too_many_arguments)] // the inputs of the engine's other starts
+#[allow(clippy::too_many_arguments)] // one argument for each input, as in `blocks`
 pub fn stitch<const D: usize>(
     source: &Source<D>,
     region: &Region<D>,

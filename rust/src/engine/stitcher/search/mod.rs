@@ -26,7 +26,7 @@ use spectra::{Spectra, Template};
 
 /// Minimum distance of two candidates, in samples.
 const APART: i32 = 3;
-/// Maximum distance, in samples, of a candidate that counts as the continuation of a neighbour.
+/// Candidates within this distance of the exact continuation of a neighbour, in samples, count as continuations.
 const NEAR: i32 = 6;
 /// Minimum number of points of a neighbour that a candidate can continue.
 const FEW: u32 = 12;
@@ -48,7 +48,7 @@ pub(super) struct Charges {
     pub continuation: f32,
 }
 
-/// An exemplar that is searched.
+/// An exemplar, prepared for the search.
 pub(super) struct Index<const D: usize> {
     grid: Grid<D>,
     spectra: Arc<Spectra<D>>,
@@ -276,7 +276,7 @@ impl<const D: usize> Index<D> {
         self.charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
     }
 
-    /// Returns the cost of a candidate that does not depend on its fit.
+    /// Returns the part of a candidate's cost that does not depend on its fit.
     fn charge(&self, centre: [i32; D], continued: &[[i32; D]]) -> f32 {
         let goes_on = continued
             .iter()
@@ -389,7 +389,7 @@ impl<const D: usize> Index<D> {
 }
 
 impl<const D: usize> Range<D> {
-    /// Returns the nearest sample that the centre may have.
+    /// Returns the allowed sample for the centre that is nearest to `at`.
     fn bring(&self, at: [i32; D], grid: &Grid<D>) -> [i32; D] {
         std::array::from_fn(|a| {
             let n = grid.shape()[a] as i32;

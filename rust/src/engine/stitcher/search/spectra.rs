@@ -33,7 +33,7 @@ enum Asked {
     Levels {
         /// The first level.
         low: f32,
-        /// Difference of two levels.
+        /// Difference between adjacent levels.
         step: f32,
         costs: Vec<Spectrum>,
     },
