@@ -190,7 +190,7 @@ impl Appearance {
     }
 
     #[staticmethod]
-    #[allow(clippy::too_many_arguments)] // the arrays of an analysis
+    #[allow(clippy::too_many_arguments)] // one argument for each array of an analysis
     fn from_parts(
         shape: Vec<usize>,
         wrap: Vec<bool>,

@@ -44,7 +44,7 @@ pub(super) fn watershed_regions<'py>(
     Ok((PyArray1::from_vec(py, labels).reshape(shape)?, count))
 }
 
-/// Pairs of regions, their borders, and the extreme pixels of regions.
+/// Pairs of adjacent regions, measures of the border of each pair, and the extreme pixels of each region.
 type Adjacency<'py> = (
     Bound<'py, PyArray2<u32>>,
     Bound<'py, PyArray2<f64>>,

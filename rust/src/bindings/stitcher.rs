@@ -55,7 +55,7 @@ type StitchedOut<'py> = (
 #[pymethods]
 impl Stitcher {
     #[new]
-    #[allow(clippy::too_many_arguments)] // the arrays of an exemplar
+    #[allow(clippy::too_many_arguments)] // one argument for each array of an exemplar
     fn new(
         py: Python<'_>,
         colours: PyReadonlyArray2<'_, f32>,

@@ -106,10 +106,10 @@ impl<const D: usize> Frames<'_, D> {
     }
 }
 
-/// Returns F = J^-1 in fixed point, with entries clamped to 64, or the identity if the frame is
-/// singular.
+/// Returns F = J^-1 in fixed point, with entries clamped to the range from -64 to 64, or the
+/// identity if the frame is singular.
 pub fn inverse<const D: usize>(frame: &Frame<D>) -> [[i32; D]; D] {
-    // Gauss-Jordan elimination with pivots on at most three rows.
+    // Gauss-Jordan elimination with row pivoting.
     let mut a = frame.map(|row| row.map(f64::from));
     let mut b = [[0.0; D]; D];
     for i in 0..D {

@@ -1,8 +1,8 @@
 //! Counter-based noise: Philox4x32-10.
 //!
-//! Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. A value
-//! depends only on the seed and on its position. The order of visits to positions therefore does
-//! not matter.
+//! The method is by Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3*,
+//! SC 2011. A value depends only on the seed and on its position. The order of visits to positions
+//! therefore does not matter.
 
 const ROUNDS: usize = 10;
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];

@@ -103,7 +103,7 @@ macro_rules! four {
         /// Applies the operator to four pairs of numbers by one instruction, which all x86-64
         /// processors have. Otherwise the compiler often computes the pairs one by one in functions
         /// with more values than registers.
-        #[allow(unsafe_code)] // arrays as registers
+        #[allow(unsafe_code)] // reinterprets arrays as registers
         #[inline(always)]
         pub(crate) fn $name(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
             #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
@@ -128,8 +128,8 @@ four!(add_four _mm_add_ps +, subtract_four _mm_sub_ps -, multiply_four _mm_mul_p
 /// overflow.
 ///
 /// One instruction, which all x86-64 processors have, multiplies and adds. The compiler does not
-/// find it in plain code and uses four times as many instructions.
-#[allow(unsafe_code)] // arrays as registers
+/// use it for plain code, and needs four times as many instructions.
+#[allow(unsafe_code)] // reinterprets arrays as registers
 #[inline(always)]
 pub(crate) fn square_apart(a: &[i16; 8], b: &[i16; 8]) -> [i32; 4] {
     #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
