@@ -300,7 +300,7 @@ class Appearance:
         passes : int
             Maximum number of passes, up to 1000. Each corrects every other point, as on a chess board.
         first : int
-            Number of the first pass, for work that is divided into several calls.
+            Index of the first pass, for work that is divided into several calls.
         exhaustive : bool
             If True, each pass compares each window with all windows of the exemplar. Use it for small exemplars.
         reach : int

@@ -209,7 +209,7 @@ def jitter(
     reach : float
         Maximum displacement along an axis, in samples, 0 to 65536.
     seed, level : int
-        Seed of the noise, and number of the level, which gives each level its own noise.
+        Seed of the noise, and index of the level, which gives each level its own noise.
     held : (points) bool, optional
         True for points whose coordinates are not displaced.
 

@@ -198,7 +198,8 @@ class Stitcher:
         overlap : float
             Overlap of neighbours, as a share of the patch side, 0 to 0.8.
         candidates : int
-            Number of source positions that are tried for each patch, 1 to 64. The one with the cheapest seam is used.
+            Number of source positions that are tried for each patch, 1 to 64. The position with the cheapest seam is
+            used.
         bend : bool
             If True, patches bend with the field. Otherwise they are rotated and scaled as a whole.
         recover : float

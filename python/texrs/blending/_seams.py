@@ -135,7 +135,7 @@ def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, .
 
 
 def _list_frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
-    """Return the Jacobians of some pixels, (n, 2, 2)."""
+    """Return the Jacobians of the given pixels, (n, 2, 2)."""
     frame = source.jacobian_array()
     if frame is None:
         return np.broadcast_to(np.eye(2, dtype=np.float32), (len(at[0]), 2, 2))

@@ -77,7 +77,7 @@ class Samples:
         return [slice(c, c + 1) for c in range(self.channels)]
 
     def correct(self, pixels: Array, correction: Floats, channels: slice, map_type: str) -> None:
-        """Add a correction to channels of pixels, in the exemplar's own values and in place."""
+        """Add a correction to channels of pixels in place, after converting it to the exemplar's range of values."""
         exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
         for rows in divide_rows(len(pixels)):
             change = correction[rows].astype(exact)

@@ -117,7 +117,10 @@ def load(name: str) -> Callable[..., None]:
 
 
 def make_command(name: str) -> Any:
-    """Create a command with its own options and those for limits. A command that writes files also gets ``--force``."""
+    """Create a command with its own options and the options of limits.
+
+    A command that writes files also gets ``--force``.
+    """
     from texrs.cli._limits import limit, list_parameters
     from texrs.cli._options import as_command, make_parameter
     from texrs.cli._outputs import OUTPUTS, Command, Force

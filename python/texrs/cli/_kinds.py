@@ -237,4 +237,7 @@ KINDS = {
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
 }
-"""Kinds of parameters by name, for names whose type is not sufficient. A name has the same kind in all commands."""
+"""Kinds of parameters by name, for parameters whose type does not determine the kind.
+
+A name has the same kind in all commands.
+"""

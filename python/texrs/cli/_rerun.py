@@ -319,7 +319,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
 
 
 def describe_folder(folder: str) -> list[str]:
-    """Return lines that describe the maps in a folder, or the volume in its slices."""
+    """Return lines that describe the maps in a folder, or the volume whose slices it contains."""
     try:
         return describe_material(folder, "map")
     except FileError as error:

@@ -65,7 +65,7 @@ GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemp
 
 
 def make_verb(name: str) -> Verb:
-    """Create the command of a name. The module of its function is imported now."""
+    """Create the command with a given name. The module of its function is imported now."""
     match name:
         # Each case imports only its own function, so that other commands start quickly.
         case "inpaint":

@@ -53,7 +53,7 @@ def always(do: Do) -> Callable[[Mapping[str, str]], Do | None]:
 def find_module(name: str, do: Callable[[Any, Request], Array]) -> Callable[[Mapping[str, str]], Do | None]:
     """Return a finder for a method of a module, which it loads.
 
-    For an inner name such as ``cv2.xphoto``, it loads the outer one.
+    For a submodule such as ``cv2.xphoto``, the finder loads its parent module.
     """
 
     def find(named: Mapping[str, str]) -> Do | None:

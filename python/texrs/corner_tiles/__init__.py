@@ -297,7 +297,7 @@ class CornerTiles(InParts):
         return Synthesis(maps[self._base], here, {"before_blending": maps[self._base]}, report, material)
 
     def _read(self, origin: Sequence[int], size: Sequence[int], arrays: Sequence[Array]) -> list[Array]:
-        """Read a window from each of some arrays of the atlas."""
+        """Read a window from each of the given arrays of the atlas."""
         side = self._side
         first = [o // side for o in origin]
         cells = [(o + n - 1) // side - f + 1 for o, n, f in zip(origin, size, first, strict=True)]
@@ -396,7 +396,7 @@ class _Reader:
         return content_hash(self.tiles.key, self.origin).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Read a part of some maps."""
+        """Read a part of the given maps."""
         start = [s.start + o for s, o in zip(box, self.origin, strict=True)]
         size = [s.stop - s.start for s in box]
         found = self.tiles._read(start, size, [self.tiles._maps[name] for name in names])

@@ -82,7 +82,7 @@ def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> St
 
 
 def _find_phase(first: Array, other: Array, shifts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the shift of an image against another one that correlates best over all periods."""
+    """Return the shift between two images that gives the best correlation over all periods."""
     comb = np.zeros(first.shape[:2])
     comb[tuple(shifts.T)] = 1 / len(shifts)
     pictures = (image.reshape(*comb.shape, -1)[..., :3].mean(axis=-1, dtype=np.float64) for image in (first, other))

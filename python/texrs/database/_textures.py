@@ -354,7 +354,7 @@ class TextureDatabase:
         elements : str
             Name of the texture whose elements are shown.
         layout : str
-            Name of the texture whose layout they take.
+            Name of the texture whose layout the elements take.
         size : (rows, columns), optional
             Size of the result in pixels. Default: the size of ``elements``.
         progress : callable or True, optional

@@ -28,7 +28,7 @@ MAX_CONDITION = 100.0
 FAR = 1e9
 """Maximum absolute length or coordinate, in voxels."""
 MOST_BYTES = 2**32
-"""Maximum bytes of a lattice of frames."""
+"""Maximum memory of a lattice of frames, in bytes."""
 _BLOCK = 2**13
 """Number of points evaluated at a time. The result does not depend on it."""
 _NAMES = ("row", "column"), ("plane", "row", "column")

@@ -187,7 +187,7 @@ def circular(
 ) -> Field:
     """Return the field that winds the texture round an axis: one of its axes is radial, one tangential.
 
-    Let d be the vector from the axis to a point. Then ``F e_r = d / |d|``, and F e_t is the same rotated by a right
+    Let d be the vector from the axis to a point. Then ``F e_r = d / |d|``, and F e_t is this vector rotated by a right
     angle towards t. The third axis does not change. On the axis itself F is the identity.
 
     Parameters

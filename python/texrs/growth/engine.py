@@ -105,7 +105,7 @@ class Start:
     Attributes
     ----------
     level : int
-        Number of the first level.
+        Index of the first level.
     make : callable
         Function that returns the places, and their patches or None. Its arguments are a region, its frames, the
         constraints and the progress function.
@@ -192,7 +192,7 @@ def grow(
     levels : int
         Number of levels of the exemplar's pyramid. The last one has the resolution of the output.
     start : Start
-        Number of the first level, and the function that computes its places.
+        Index of the first level, and the function that computes its places.
     correct : Corrector
         Function that corrects the places of a level.
     frames : callable

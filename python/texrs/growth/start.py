@@ -65,7 +65,7 @@ def from_patches(
     exemplar : Exemplar
         Exemplar that patches are cut from.
     level : int
-        Number of the start's level. Use 0 with one level, so that patches are stitched at full resolution.
+        Index of the start's level. Use 0 with one level, so that patches are stitched at full resolution.
     seed : int
         Seed of the choice of patches.
     candidates : int

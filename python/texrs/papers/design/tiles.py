@@ -34,7 +34,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     shapes : tuple of (h, w)
         Height and width of all exemplars.
     which : int
-        Number of the draft's exemplar.
+        Index, from 0, of the draft's exemplar.
     seed : int
         Seed that selects patches for places whose surroundings are all open.
 

@@ -32,7 +32,7 @@ class PreparedExemplar:
     target : (rows, columns) float32
         Requested size of elements, in the units of the sheet.
     wanted : (rows, columns) float32
-        The same sizes in the units of the caller's target, limited to the available scales.
+        Requested size of elements in the units of the caller's target, limited to the available scales.
     frames : (points, 2, 2) int16, optional
         Jacobians of the sheet at each point of the output. None if ``target`` determines them.
     outside : Outside

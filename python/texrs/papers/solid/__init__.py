@@ -419,7 +419,7 @@ def as_coordinates(places: Places, region: Region) -> Array:
 
 
 def show_places(image: Array, places: Places, region: Region, spacing: int) -> Array:
-    """Look up the exemplar at some coordinates: return the whole image, or the middle plane of a volume."""
+    """Look up the exemplar at given coordinates: return the whole image, or the middle plane of a volume."""
     axes = len(region.shape)
     shown = places.reshape(*region.shape, axes)
     if axes == 3:

@@ -64,7 +64,7 @@ BESIDE = 8
 _PROBES, _FAR = 64, 512
 
 Key: TypeAlias = tuple[int, ...]
-"""Number of a layer, followed by the number of a box along each axis."""
+"""Index of a layer, followed by the index of a box along each axis."""
 
 
 class Seen(NamedTuple):
@@ -156,7 +156,7 @@ class Layers:
         return self._bring_around(out)
 
     def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[Box]:
-        """Yield some boxes one after the other. Boxes of one layer are computed in parallel."""
+        """Yield the boxes with the given keys, one after the other. Boxes of one layer are computed in parallel."""
         advance = stage(progress, "patches")
         total = len(self._find_missing(keys)) if advance else 0
         work: Cache[Key, Box] = Cache(WORK, lambda box: box.nbytes)
@@ -186,7 +186,7 @@ class Layers:
                     yield self._get(key, work, lambda share: watch(0, 0.0))
 
     def _find_missing(self, keys: Sequence[Key]) -> set[Key]:
-        """Return the keys of all boxes, including lower layers, that must be computed for some boxes."""
+        """Return the keys of all boxes, including lower layers, that must be computed for the given boxes."""
         found: set[Key] = set()
         todo = list(keys)
         while todo:

@@ -103,7 +103,7 @@ class Correction:
     exemplar: Exemplar
     seed: int
     first: int
-    """Number of the coarsest level of the output. It is below 0 if the exemplar does not have a level this coarse."""
+    """Index of the coarsest level of the output. It is below 0 if the exemplar does not have a level this coarse."""
     compensated: bool
 
     def __call__(

@@ -49,7 +49,7 @@ class Endless(InParts):
 
     @abstractmethod
     def _look_up(self, origin: Sequence[int], size: Sequence[int], names: Sequence[str]) -> Material:
-        """Return some maps of a material in a window."""
+        """Return the given maps of a material in a window."""
 
     def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
         """Return the reader of a part, after checking that the part is within the allowed coordinates."""
@@ -84,7 +84,7 @@ class _Windows:
         return None if self.texture.key is None else content_hash(self.texture.key, self.origin).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
-        """Return some maps in a box of indices."""
+        """Return the given maps in a box of indices."""
         start = tuple(s.start + o for s, o in zip(box, self.origin, strict=True))
         size = tuple(s.stop - s.start for s in box)
         if self.texture.material is None:

@@ -127,7 +127,7 @@ class Request:
 def as_field(
     field: object, axes: int, extent: Sequence[int] | None = None, spacing: Sequence[float] | None = None
 ) -> Field | None:
-    """Check a field, or create it from words or an array and a voxel ``spacing``. The identity gives None."""
+    """Check a field, or create it from words or an array and a voxel ``spacing``. The identity is returned as None."""
     as_distances(spacing, axes)
     known = make_field(field, axes, extent, spacing=spacing)
     still = known is None or (

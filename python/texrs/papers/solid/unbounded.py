@@ -394,7 +394,7 @@ class Texture(Endless):
     def _look_up(
         self, origin: Sequence[int], size: Sequence[int], names: Sequence[str], progress: Progress | None = None
     ) -> Material:
-        """Return some maps of a material in a window, without the other results of `window`."""
+        """Return the given maps of a material in a window, without the other results of `window`."""
         assert self._material is not None
         region = Region(tuple(size), tuple(origin), (False,) * self.axes)
         self._check(region)

@@ -47,7 +47,7 @@ class PlaneTexture(Texture):
         exemplar of few colours, so that no colours are added, else "cubic".
     spacing : sequence of 2 float, optional
         Distances between rows and columns, in any unit. The field rotates in space, where pixels can be rectangles.
-        Its places and lengths are in the same unit. Windows and points are still in pixels. Default: 1.
+        The places and lengths of the field are in the same unit. Windows and points are still in pixels. Default: 1.
     cache_bytes : int
         Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
         MiB.
@@ -101,9 +101,9 @@ class SolidTexture(Texture):
     interpolation : {"nearest", "linear", "cubic"}, optional
         Interpolation between the exemplar's samples. Labels always use the nearest sample. Default: "cubic".
     spacing : (plane, row, column) float, optional
-        Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. Its places
-        and lengths are in the same unit. Windows and points are still in voxels. Default: the spacing that the
-        exemplar's file states, else 1.
+        Voxel size along each axis, in any unit. The field rotates in space, where voxels need not be cubes. The places
+        and lengths of the field are in the same unit. Windows and points are still in voxels. Default: the spacing
+        that the exemplar's file states, else 1.
     cache_bytes : int
         Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
         MiB.

@@ -235,7 +235,7 @@ class World:
         self.read(region, progress, stage)
 
     def _make_region(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
-        """Return the region that some cached cells cover."""
+        """Return the region that the given cached cells cover."""
         return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
 
 

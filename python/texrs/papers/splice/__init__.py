@@ -429,7 +429,7 @@ def self_splice(
         - ``matching``: Line from each element to its target.
         - ``warped mesh``: Mesh that moves the elements.
         - ``before refinement``: The texture with elements in their new places, with its holes.
-        - ``filled``: The same with its holes filled.
+        - ``filled``: This texture with its holes filled.
         - ``before_blending``: The resulting image.
 
         Report:

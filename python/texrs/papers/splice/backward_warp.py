@@ -58,7 +58,7 @@ def warp_backwards(
     a : ElementAnalysis
         The texture.
     match : Match
-        Targets of its elements.
+        Targets of the texture's elements.
     size : (int, int)
         Rows and columns of the output.
     method : {None, "paper", "preview"}

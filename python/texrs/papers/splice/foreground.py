@@ -37,7 +37,7 @@ class Foreground:
     region : (H, W) int32
         The element of each foreground pixel and its fringe, counted from 1, and 0 for other pixels.
     core : (H, W) int32
-        The same without the fringe of 2 pixels.
+        The element of each foreground pixel without the fringe of 2 pixels, counted from 1, and 0 for other pixels.
     cut : (n, 2, 2) bool
         True if the image border cuts an element, at the start and the end of each axis.
     present : (n) bool

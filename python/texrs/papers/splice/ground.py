@@ -71,7 +71,7 @@ class Scene:
     light : Light or None
         The removed light, or None if the light was even.
     own : (h, w) int32
-        Number of the element of each pixel, counted from 1. An element includes its matte and the pixels next to it.
+        Index of the element of each pixel, counted from 1. An element includes its matte and the pixels next to it.
         Background is 0, and foreground without an element is -1.
     certain : (h, w) bool
         True for pixels of mattes, without the border around them.

@@ -2,7 +2,7 @@
 
 This is the limit of Eq. 5 for large lambda_G and lambda_R and epsilon = 0, where each element moves only with its own
 pin. The displacement of the background is harmonic, so no pixel moves further than the elements around it. It is
-smooth enough to be solved at every other pixel. The pixels between are interpolated and smoothed.
+smooth enough to be solved at every other pixel. Values between the solved pixels are interpolated and smoothed.
 """
 
 from __future__ import annotations

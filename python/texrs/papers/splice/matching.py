@@ -181,7 +181,7 @@ def is_own(a: ElementAnalysis, b: ElementAnalysis) -> bool:
 
 
 def interpolate_layouts(a: ElementAnalysis, match: Match, strength: float) -> Match:
-    """Move the targets of elements a share of the way: 0 keeps the texture's own layout, 1 uses the other one."""
+    """Move the targets of elements a share of the way from the texture's own layout (0) to the other layout (1)."""
     targets, assigned = match.starts + strength * match.shift, match.assigned
     if a.layout == Layout.DISJOINT:
         # Keep a share of the elements without a target, in the places with most room. Otherwise they would all be

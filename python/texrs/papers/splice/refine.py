@@ -92,7 +92,7 @@ class Draft:
 
 
 def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, progress: Progress | None) -> Draft:
-    """Fill the holes of a draft: wide ones with patches of background, others by continuing their boundary."""
+    """Fill wide holes of a draft with patches of background, and other holes by continuing their boundary."""
     from scipy.ndimage import distance_transform_edt
 
     holes = ~draft.known

@@ -98,7 +98,7 @@ def measure_light(a: ElementAnalysis, ground: Bools, elements: Labels) -> Light 
     ground : (h, w) bool
         True for pixels of the background that are not near an element.
     elements : (h, w) int32
-        Number of the element of each pixel, counted from 1, and 0 for other pixels.
+        Index of the element of each pixel, counted from 1, and 0 for other pixels.
 
     """
     image = as_image(a.image)

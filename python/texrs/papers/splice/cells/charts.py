@@ -129,7 +129,7 @@ def _draw(
     number: NDArray[np.intp],
     count: int,
 ) -> None:
-    """Compute the source positions of the pixels of some charts."""
+    """Compute the source positions of the pixels of a group of charts."""
     sides, corner, source = charts.sides[group], charts.corner[group], charts.source[group]
     pixels = slice(charts.first[group][0], charts.first[group.start + len(sides)])
     which = np.repeat(np.arange(len(sides)), sides.prod(axis=1))
@@ -254,7 +254,7 @@ class Fields(NamedTuple):
 
 
 def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float) -> Fields:
-    """Return signed distances to the outlines of some cells, with their gradients."""
+    """Return signed distances to the outlines of the given cells, with their gradients."""
     from scipy.ndimage import find_objects
 
     boxes = find_objects(cells.labels)

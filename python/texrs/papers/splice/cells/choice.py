@@ -66,7 +66,7 @@ class Shortlist:
     cost: NDArray[np.float64]
 
     def part(self, rows: slice) -> Shortlist:
-        """Return the candidates of some of the targets."""
+        """Return the candidates of a selection of the targets."""
         return Shortlist(self.source[rows], self.turn[rows], self.scale[rows], self.cost[rows])
 
 

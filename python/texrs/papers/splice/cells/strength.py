@@ -1,7 +1,7 @@
 """Interpolate between A's own tessellation and the target tessellation if the strength is below 1.
 
 Cells of both tessellations are matched one to one at the least total squared distance, like elements (Eq. 4). Each
-outline moves a share of its way. Cells without a partner shrink or grow.
+outline moves a share of the way to its partner. Cells without a partner shrink or grow.
 """
 
 from __future__ import annotations
