@@ -33,7 +33,7 @@ class Given:
 
     def __init__(self, number: int) -> None:
         self.picture = np.roll(texrs.samples.pebbles((SIDE, SIDE)).image, 3 * number, (0, 1))
-        # Slanting examples may not be moved up or down.
+        # Roll the floor only sideways, because a vertical roll would break its perspective.
         self.floor = np.roll(texrs.samples.tilted_discs((SIDE, SIDE)).image, 3 * number, 1)
         self.volume = np.roll(texrs.samples.particles((48, 48, 48)).image, number, (0, 1, 2))
         self.hole = np.zeros((SIDE, SIDE), np.bool_)
@@ -188,7 +188,7 @@ def main(words: list[str]) -> None:
     print("| verb | stage | longest gap, processor s |\n|---|---|---|")
     for name in words or VERBS:
         with texrs.threads(1):
-            VERBS[name](Given(0))(None)  # Load its libraries.
+            VERBS[name](Given(0))(None)  # The first call loads libraries, so it is not measured.
             found, stages = measure(VERBS[name](Given(1)))
             told = [(measure_stop(VERBS[name](Given(2 + n)), stage), stage) for n, stage in enumerate(stages)]
             stop = max(told, default=(0.0, "none"))

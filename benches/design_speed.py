@@ -72,7 +72,7 @@ def run(image: np.ndarray, options: argparse.Namespace) -> None:
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} at the start; medians of {options.rounds}\n")
     tasks: dict[str, Callable[[], object]] = {
-        # The cost of one further variant is the difference between two variants and one.
+        # The time of one further variant is the difference between the times of two variants and of one.
         "one 256^2 texture of 1 tile": lambda: texrs.design(image, 256, copies=1),
         "one 256^2 texture of 2 tiles": lambda: texrs.design(image, 256, copies=2),
         "1024^2, cyclic, 8 tiles": lambda: texrs.design(image, 1024, copies=8),

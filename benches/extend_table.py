@@ -97,7 +97,7 @@ def main() -> None:
         cells = ["not followed", "-", "-", "-"]
         if said is not None:
             plane = Plane.of(said)
-            # Corners of a rectangle of the plane, in the larger image.
+            # Compute the corners of a rectangle of the plane, in the larger image.
             flat = plane.flatten(np.array([[rows / 2, columns / 2]]))[0]
             ways = min(rows, columns) / 8 * np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]])
             corners = plane.project(flat + ways) + np.array([top, left])

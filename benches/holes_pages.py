@@ -85,7 +85,7 @@ def make(options: argparse.Namespace) -> None:
         image = np.ascontiguousarray(image[..., :3] if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2))
         holes = draw_holes(image.shape, options.holes, rng)
         hole = mark(image.shape, holes)
-        # Remove the pixels in the holes for all methods.
+        # Blacken the holes, so that no method can read their pixels.
         bare = np.where(hole[..., np.newaxis], np.uint8(0), image) if name != "untouched" else image
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

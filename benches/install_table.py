@@ -69,7 +69,7 @@ def spend(command: list[str], place: Path) -> tuple[float, str]:
         "PIP_NO_CACHE_DIR": "1",
         "PIP_DISABLE_PIP_VERSION_CHECK": "1",
     }
-    # The configuration of the network is not part of the test.
+    # Keep the configuration of the network, which is not part of the test.
     kept = (name for name in os.environ if name.startswith(("PIP_", "SSL_")) or name.lower().endswith("_proxy"))
     environment = {name: os.environ[name] for name in kept} | environment
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -72,7 +72,8 @@ def check(made: Path, example: Path, source: texrs.SourceMap) -> list[str]:
     """Return whether register and dtypes are exact, and the error of normals."""
     before, after = texrs.Material.read(example), texrs.Material.read(made)
     shown = np.stack(np.divmod(after[IDS].pixels, before.shape[1]), axis=-1)
-    # Halfway between two pixels both are the nearest. Coordinates beyond the border use the last pixel.
+    # A position halfway between two pixels has two nearest pixels, so `NEAR` is slightly above 0.5. Positions beyond
+    # the border use the last pixel.
     places = np.clip(source.coordinates, 0, np.array(before.shape) - 1)
     exact = float((np.abs(shown - places).max(axis=-1) <= NEAR).mean())
     kept = all(after[name].pixels.dtype == each.pixels.dtype for name, each in before.items())
@@ -83,7 +84,7 @@ def check(made: Path, example: Path, source: texrs.SourceMap) -> list[str]:
         plain = decode_normals(source.render(before[name].pixels), before[name].role, signed=False)
         made_so = decode_normals(after[name].pixels, after[name].role, signed=False)
         frames, looked = source.jacobians(), source.render(own, interpolation="linear")
-        # Heights h(S(p)) have the slopes J^T grad h. Rows go down, and y goes up.
+        # Heights h(S(p)) have the slopes J^T grad h. Rows grow downwards and y grows upwards, so the sign changes.
         slopes = np.einsum("...ji,...j->...i", frames, np.stack([-looked[..., 1], looked[..., 0]], -1))
         expected = np.concatenate([slopes[..., 1:], -slopes[..., :1], looked[..., 2:]], axis=-1)
         expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -131,7 +132,7 @@ def report(name: str, verb: str, words: list[str], example: Path, given: argpars
         while (done := os.wait4(process.pid, os.WNOHANG))[0] == 0:
             time.sleep(0.2)
             if time.monotonic() - start > given.limit:
-                # Kill by number, because Popen would fetch the status that is waited for here.
+                # Kill by number, because `Popen.kill` would fetch the exit status, which os.wait4 must get.
                 os.kill(process.pid, signal.SIGKILL)
     except KeyboardInterrupt:
         process.kill()

@@ -80,7 +80,7 @@ def measure(name: str) -> int:
 def run(verb: str, side: int, size: int) -> None:
     """Measure one verb, and print its line."""
     warnings.simplefilter("ignore")
-    # Use another image, because results for an image are cached.
+    # Load the libraries with a small image. It differs from the measured one, because results for an image are cached.
     small, larger = {"solid": (36, 40), "CornerTiles": (96, 288)}.get(verb, (96, 128))
     make_call(verb, make_picture(verb, small), larger)()
     picture = make_picture(verb, side)
@@ -88,7 +88,7 @@ def run(verb: str, side: int, size: int) -> None:
     several = [picture.shape] * (2 if verb == "splice" else 1)
     predicted = texrs.limits.estimate_memory(verb, several, result, dtype=picture.dtype)
     gc.collect()
-    # Memory that the C library keeps for later is not memory of the verb.
+    # Return the memory that the C library keeps for later, so that the verb has to request its memory again.
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
     before, start = measure("VmRSS"), time.process_time()

@@ -30,7 +30,7 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=3)
     asked = parser.parse_args()
     image, scale = checks.floor((160, 160))
-    texrs.perspective(image, scale, 64)  # Exclude work that is done once.
+    texrs.perspective(image, scale, 64)  # Do the work that is done only once.
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print("| output | seconds | CPU | microseconds of CPU a pixel | bytes a pixel above what is given back |")
     print("|---|---|---|---|---|")

@@ -60,7 +60,7 @@ def rate() -> float:
 
 def peak(size: int, quality: str) -> tuple[float, float]:
     """Return the peak memory of a process that grows a volume, and of one that only loads texrs, in MiB."""
-    # On Linux a process inherits ru_maxrss from its parent. Its own peak is in /proc.
+    # On Linux a process inherits ru_maxrss from its parent, so read its own peak from /proc.
     script = (
         "import pathlib, re, resource, sys, texrs; from texrs import fields, samples\n"
         "size = int(sys.argv[1])\n"
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace) -> None:
         if size != 128:
             tasks[f"{size}^3 fast"] = grow(size, field=wound, quality="fast")
     for quality in ("fast", "optimise") if options.optimise else ("fast",):
-        texrs.solid(solid, 32, quality=quality)  # Make the analysis once, and time it separately.
+        texrs.solid(solid, 32, quality=quality)  # The analysis is cached here, and timed separately.
         texrs.synthesize(flat, 64, quality="fast")
     times: dict[str, list[float]] = {name: [] for name in tasks}
     work: dict[str, float] = {}

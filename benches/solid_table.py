@@ -31,7 +31,7 @@ CROP = 64
 HEAD = ("S1", "S2", "S3", "S3b", "S5", "S6", "S9")
 FIELDS = {
     "identity": fields.identity(),
-    # Its folds must not be on planes where S6 looks for traces of the algorithm.
+    # The folds of this zigzag must not be on planes where S6 looks for traces of the algorithm.
     "zigzag": fields.zigzag(period=60, angle=30, plane="xz"),
     "circular": fields.circular(axis="x", radial="z"),
     "rotation": fields.rotation(30, "xz"),

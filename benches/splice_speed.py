@@ -65,7 +65,7 @@ def splices(sides: list[int]) -> None:
             def work(mine: ElementAnalysis = mine, theirs: ElementAnalysis = theirs) -> texrs.Synthesis:
                 return texrs.splice(mine, theirs, seed=1)
 
-            # Textures composed of cells or knots have no system to solve.
+            # Textures composed of cells or knots have no system to solve, so their report lacks its size.
             system = work().report.get("system", [0])
             cold, cached = best(work, forget), best(work)
             preview = best(lambda mine=mine, theirs=theirs: texrs.splice(mine, theirs, seed=1, method="preview"))

@@ -47,7 +47,7 @@ def measure() -> Iterator[Spent]:
     both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     start, before = time.perf_counter(), sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, both))
     yield spent
-    # The memory of a process is known after its end.
+    # Wait for child processes, because their memory is only known after their end.
     for each in multiprocessing.active_children():
         each.join(60)
     used = list(map(resource.getrusage, both))

@@ -26,7 +26,7 @@ def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Samp
 
     @functools.wraps(make)
     def draw(*given: Any, **options: Any) -> samples.Sample:
-        # Use the text of the arguments, not their values: 64.0 equals 64, and must be refused.
+        # Use the text of the arguments as the key, because 64.0 equals 64 but must be refused.
         asked = repr((given, options))
         if asked not in kept:
             kept[asked] = make(*given, **options)
@@ -37,7 +37,7 @@ def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Samp
     return draw
 
 
-# Tests reach the original generators through `inspect.unwrap`.
+# Replace the generators by cached ones. Tests reach the originals through `inspect.unwrap`.
 for name, generator in samples._GENERATORS.items():
     samples._GENERATORS[name] = draw_once(generator)
     setattr(samples, name, samples._GENERATORS[name])

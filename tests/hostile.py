@@ -317,7 +317,7 @@ class Call:
                 positional.append(given[p.name])
         made = self.function(*positional, **named)
         if inspect.isgenerator(made):
-            # Generators compute their values on request.
+            # A generator computes its values on request, so request one.
             made = next(made, None)
         if isinstance(made, contextlib.AbstractContextManager) and hasattr(made, "gen"):
             with made:
@@ -329,14 +329,15 @@ def record(name: str, place: Path) -> Call | None:
     """Run the examples of a function, and return the last call of it, or None without arguments."""
     thing, function = public_calls()[name]
     found: dict[str, Any] = {}
-    # Examples of a method may be in the docstring of its class.
+    # Find the class of a method, because examples of the method may be in the docstring of its class.
     owner = public_calls().get(name.rpartition(".")[0], (None, None))[0]
 
     def note(frame: Any, event: str, argument: object) -> None:
         if event == "call" and frame.f_code is function.__code__:
             me = frame.f_locals.get("self")
             if me is None or not inspect.isclass(owner) or isinstance(me, owner):
-                # An inherited method is also called for other objects, such as `Mapping.get` for the environment.
+                # Record only calls for objects of the class. An inherited method is also called for others, such as
+                # `Mapping.get` for the environment.
                 found.clear()
                 found.update(frame.f_locals)
 
@@ -350,7 +351,7 @@ def record(name: str, place: Path) -> Call | None:
         with keep_folders(place), contextlib.redirect_stdout(io.StringIO()):
             for example in doctest.DocTestParser().get_examples(text or ""):
                 code = compile(example.source, "<example>", "single")
-                # Examples may show an error.
+                # Some examples show an error of texrs.
                 with contextlib.suppress(texrs.errors.TexrsError):
                     sys.setprofile(note)
                     try:

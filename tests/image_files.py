@@ -108,14 +108,14 @@ def npz_bomb(members, packing=zipfile.ZIP_DEFLATED):
         for name, (shape, dtype) in members.items():
             head = npy(f"{{'descr': {np.dtype(dtype).str!r}, 'fortran_order': False, 'shape': {shape}}}")
             size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
-            # The first bytes are in an uncompressed deflate block of their own.
+            # Store the header of the array in an uncompressed deflate block of its own.
             stored = b"\0" + struct.pack("<HH", len(head), len(head) ^ 0xFFFF) + head
             data = stored + zeros(size)
             info = zipfile.ZipInfo(f"{name}.npy")
             at = file.tell()
             archive.writestr(info, data)
             info.compress_type, info.file_size = packing, len(head) + size
-            # Also include the local header in the archive.
+            # Write the changed type and size also to the local header of the member.
             end = file.tell()
             file.seek(at)
             file.write(info.FileHeader(False))

@@ -103,7 +103,7 @@ def kill_often(name: str, count: int, rng: random.Random, end: float, counts: co
             process.wait()
             for file, data in read_all(place).items():
                 if is_temporary(file) or ".zarr" in file or file.endswith((".json", ".npz")):
-                    # Times and manifests differ. Stores list their own missing chunks.
+                    # Files with times or manifests differ between runs, and stores list their own missing chunks.
                     continue
                 if data != reference.get(file):
                     wrong.append(f"{name}: {file} is half-written, or another, after kill {number}")

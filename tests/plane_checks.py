@@ -59,7 +59,7 @@ def look(
     rng = np.random.default_rng(seed)
     at = plane.flatten(grid)
     frames = np.linalg.inv(plane.projection_jacobians(at)) / OVER
-    # If the sample is not tileable, a line is visible, which the checks ignore.
+    # A sample that is not tileable shows a line where it repeats, which the checks tolerate.
     places = np.clip((at + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
     shown = SourceMap.from_coordinates(places, (SIDE, SIDE), jacobian=frames.astype(np.float32)).render(
         texture, interpolation="linear", antialias=True

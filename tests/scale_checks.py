@@ -72,7 +72,7 @@ def in_folder(folder: Path) -> Iterator[Case]:
         for name, known in json.loads(listing.read_text(encoding="utf-8")).items():
             image = io.read(listing.parent / name)
             size = image.shape[:2]
-            # Use every second pixel, beginning with the first.
+            # The stored map contains every second pixel, beginning with the first.
             area = np.load(listing.parent / known["scale_map"].split()[0]).astype(np.float64)
             at = np.meshgrid(
                 *(np.minimum(np.arange(n) / 2, m - 1) for n, m in zip(size, area.shape, strict=True)), indexing="ij"

@@ -137,7 +137,7 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
         {
             "coherent": (reuse.coherent, least, 1),
             "largest": (reuse.largest, 0, max(0.06, four)),
-            # Patches that cover seams are chosen for this purpose, however often they were shown.
+            # The limit is high, because patches that cover seams are chosen however often they are used.
             "most used": (reuse.most_used, 0, 16),
         }
     )
@@ -158,13 +158,14 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
     for change, profile in zip(volume.seam_planes(seen), volume.seam_planes(own), strict=True):
         for period in (8, 16, 24, 32):
             if has_period(profile, period):
-                continue  # Changes of the texture itself give no evidence.
-            # A lattice of the algorithm begins at its own planes. A lattice of the texture begins anywhere.
+                continue  # The texture itself has this period.
+            # Planes of the algorithm's lattice have the last offset. Planes of the texture's own lattice can have any
+            # offset.
             combs = [change[first::period] for first in range(period)]
             over = [abs(float(np.log(max(comb.mean(), 1e-9) / change.mean()))) for comb in combs if len(comb)]
             if len(over) < period:
                 continue
-            # If the others vary widely, one of them is always the largest.
+            # Subtract the spread of the other offsets: if they vary widely, a larger change does not give evidence.
             more = over[-1] - max(over[:-1]) - 2 * float(np.std(over[:-1]))
             if more > beyond:
                 worst, beyond = float(np.exp(over[-1])), more

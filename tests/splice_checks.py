@@ -110,7 +110,7 @@ def copied(a: ElementAnalysis, result: Synthesis) -> tuple[float, float | None]:
     starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
     away = (result.source_map.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
-    # Elements move by whole pixels.
+    # Elements move by whole pixels, so allow a rounding error of one pixel.
     return share, float((np.abs(away) <= 1.01).all(axis=1).mean())
 
 

@@ -92,12 +92,12 @@ def test_names_count_as_in_a_folder(
     assert "read as" not in capsys.readouterr().err
     plain = io.read(tmp_path / "plain.tif")
     assert (plain == io.read(tmp_path / "told.tif")).all()
-    # In Python a path also has a name.
+    # In Python, the role is also read from the name of a path.
     source = texrs.SourceMap.load(places / "m.npz")
     assert (texrs.apply(source, places / name) == plain).all()
     if "label" in options:
         assert set(np.unique(plain)) <= set(np.unique(io.read(places / name)))
-    # Do the same through a store, in parts.
+    # Writing to a store in parts must give the same pixels.
     pytest.importorskip("zarr")
     assert main([*words, str(tmp_path / "parts.zarr"), "--screening", "0"]) == 0
     assert main([*words, str(tmp_path / "told.zarr"), "--screening", "0", *options]) == 0

@@ -49,7 +49,7 @@ def files() -> list[tuple[str, str]]:
 
 def uses(code: str) -> set[tuple[str, str]]:
     """Return (layer, module) of every path that begins at the root of the crate."""
-    # Write one path for each name in braces: use crate::a::{b::c, d} is crate::a::b::c and crate::a::d.
+    # Expand names in braces to one path each: use crate::a::{b::c, d} becomes crate::a::b::c and crate::a::d.
     flat = re.sub(
         r"\b(crate(?:::\w+)*)::\{([^{}]*(?:\{[^{}]*\}[^{}]*)*)\}",
         lambda m: " ".join(f"{m[1]}::{item}" for item in re.split(r",\s*(?![^{}]*\})", m[2]) if item.strip()),
@@ -96,7 +96,8 @@ def test_no_relative_path_reaches_a_neighbour() -> None:
 
 @pytest.mark.parametrize("crate", HOMES)
 def test_each_library_has_one_home(crate: str) -> None:
-    # A module of the same name is used by a path that begins at the root of texrs, so libm itself is ::libm.
+    # texrs has modules with the names of crates, such as libm. Their paths begin at the root of texrs, and the crate
+    # itself is ::libm.
     use = re.compile(rf"\buse (?:::)?{crate}(?:::|;| )|(?<![\w:])(?:::)?{crate}::\w")
     users = {path for path, code in FILES if use.search(code)}
     assert users, f"nothing uses {crate}"

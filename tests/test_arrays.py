@@ -205,7 +205,7 @@ def test_what_is_masked_is_a_hole():
     known = np.ma.masked_array(PEBBLES, np.repeat(HOLE[..., np.newaxis], 3, axis=-1))
     expected = texrs.inpaint(PEBBLES, HOLE).image
     assert np.array_equal(texrs.inpaint(known).image, expected)
-    # A masked value in one channel is enough, and the requested mask is filled too.
+    # A pixel is filled if one of its channels is masked, and pixels of the given mask are filled as well.
     part = np.ma.masked_array(PEBBLES, np.zeros(PEBBLES.shape, bool))
     part[20:34, 24:40, 1] = np.ma.masked
     upper, lower = HOLE.copy(), HOLE.copy()

@@ -74,7 +74,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
         "--copies": "1",
         "--seed": "4",
     }
-    # The result equals that of the command alone, from any folder.
+    # A result of the batch equals the result of the command alone, called from any folder.
     alone = [
         "design",
         "stones/dots.png",
@@ -100,7 +100,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert sum("is there" in line for line in err) == 8
     assert files(here) == whole
     assert {n for n in whole if os.stat(n).st_mtime_ns != times[n]} == {"made/sheet.png"}
-    # Missing, changed or differently made results are computed again.
+    # Results that are missing, changed or made in another way are computed again.
     Path("maps/dots-still-3.npz").unlink()
     io.write("made/weave-still-3.png", np.zeros((48, 48, 3), np.uint8))
     io.write_metadata("made/weave-still-3.png", io.Metadata(made=io.read_metadata("made/weave-turned-3.png").made))
@@ -146,7 +146,7 @@ def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
     assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
     before = files(here)
     assert sorted(n for n in before if "tile" in n) == ["stones/dots-tile.png", "stones/weave-tile.png"]
-    # Results in the folder of the inputs are not inputs.
+    # Earlier results in the folder of the inputs are not inputs.
     assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
     assert files(here) == before
     Path("masks").mkdir()
@@ -305,7 +305,7 @@ def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> No
             os.killpg(process.pid, number)
         else:
             process.send_signal(number)
-        # All workers hold the other end. It is closed when the last of them is gone.
+        # All workers hold the other end of the pipe, so reading ends when the last worker has ended.
         rest = process.stderr.read().decode()
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     assert "Traceback" not in rest
@@ -327,7 +327,7 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
         assert made == [
             f"made/{n}-{s}/{n}_{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")
         ]
-    # The second time all results exist.
+    # In the second run, all results exist already.
     assert capsys.readouterr().err.count("is there") == 4
     assert main([*words, "stacks", "--sheet", "sheet.png", "-q"]) == 0
     assert io.read("made/rock-0/rock_height.png").dtype == np.uint16

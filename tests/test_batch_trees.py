@@ -92,7 +92,7 @@ def test_maps_of_one_material_in_a_folder_of_several_are_one_job(here: Path, cap
         folders = {Path(name).parts[0] for name in made(f"out{number}")}
         assert folders == {"T_Rock", "T_Moss", "T_Rock_Wet", "photo.jpg", "bark_normal.png"}
         assert len(made(f"out{number}")) == 8
-    # The result equals that of the command with the same files, also if it is repeated from its record.
+    # Each result equals the result of the command for the same files, also if it is repeated from its record.
     one = "in/T_Moss_{BaseColor,Roughness}.png"
     assert main(["tile", one, "-o", "alone", "-q"]) == 0
     for name in made("alone"):
@@ -157,7 +157,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
     assert main([*command, "-q"]) == 0
     assert made("out") == ["a/two.png", "one.jpg"]
     assert said("out/a/two.png")["arguments"] == ["../../photos/a/two.png", "../../masks/a/two_mask.png"]
-    # One mask for all, given in either way, also if it is among the inputs.
+    # A single mask applies to all images, in every way to give it, also if it is among the inputs.
     put("photos/hole.png", HOLE)
     for number, words in enumerate(
         (

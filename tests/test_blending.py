@@ -102,7 +102,8 @@ def test_against_the_written_out_problem(wrap, screening):
     image = random.random((12, 14))
     whole = SourceMap.identity((12, 14)).coordinates
     mirrored = np.array([11, 0], np.float32) + whole * np.array([-1, 1], np.float32)
-    # A mirrored piece at the exemplar's edge is next to a plain one, so one side has no continuation.
+    # Put a mirrored piece from the exemplar's edge next to a plain one, so that one side of the seam has no
+    # continuation.
     places = np.concatenate([whole[:10, :6], mirrored[:10, 5:11]], axis=1)
     label = np.repeat([0, 1], 6)[np.newaxis].repeat(10, 0)
     frame = np.stack([np.eye(2), np.diag([-1, 1])]).astype(np.float32)
@@ -128,7 +129,7 @@ def test_a_picture_of_shifted_brightness_becomes_one():
     healed = blend(source, [dark, light], wrap=(False, False), screening=0.01)
     step = (healed - dark)[10:30, 20] - (healed - dark)[10:30, 19]
     assert np.abs(step).max() < 0.15
-    # The border keeps its values.
+    # Pixels at the border keep their values.
     rendered = source.render([dark, light])
     assert (healed[0] == rendered[0]).all()
     assert (healed[:, -1] == rendered[:, -1]).all()
@@ -148,7 +149,7 @@ def laid_on(ground, light):
 def test_an_outline_keeps_its_step():
     source, exemplars = laid_on(0.3, 0.8)
     shown = source.render(exemplars)
-    # The rest is the noise where the image wraps.
+    # The remaining differences are noise where the image wraps.
     assert np.abs(blend(source, exemplars, wrap=True) - shown).max() < 0.03
     fog = blend(source, exemplars, wrap=True, outlines=False)
     assert np.abs(fog - shown).max() > 0.1
@@ -191,7 +192,7 @@ def test_depth_and_channels(patchwork, exemplar):
     grey = blend(patchwork, exemplar[..., 0], wrap=True)
     assert grey.shape == patchwork.shape
     np.testing.assert_array_equal(grey, blend(patchwork, exemplar[..., :1], wrap=True)[..., 0])
-    # Outlines are the outlines of all channels together.
+    # Only outlines depend on all channels together, so without them a single channel has the same result.
     alone, together = (blend(patchwork, e, wrap=True, outlines=False) for e in (exemplar[..., :1], exemplar))
     assert np.abs(alone[..., 0].astype(int) - together[..., 0]).max() <= 1
 
@@ -242,7 +243,7 @@ def test_normals_of_a_turned_copy_meet_where_the_surface_does():
     """A mirror image reverses a ramp, so in the image's own axes each side has its own slope."""
     normals = np.zeros((16, 16, 3), np.float32)
     normals[..., 0], normals[..., 2] = 0.6, 0.8
-    # Maps with negative values contain vectors without encoding.
+    # One negative value shows that the map contains vectors without an encoding.
     normals[0, 0, 0] = -0.6
     places = SourceMap.identity((16, 16)).coordinates
     mirrored = places.copy()
@@ -286,7 +287,7 @@ def test_within_a_mask_all_else_stays_and_light_goes_on():
     source, ramp, lighter, inside = patched(9)
     healed = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside)
     np.testing.assert_array_equal(healed[~inside], ramp[~inside])
-    # This includes the corner of the image, where no neighbours fix the outermost pixels.
+    # The correction also reaches the corner of the image, where no neighbours fix the outermost pixels.
     np.testing.assert_allclose(healed, ramp, atol=0.02)
     near = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside, band=2)
     np.testing.assert_array_equal(near[~inside], ramp[~inside])

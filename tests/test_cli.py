@@ -216,7 +216,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
     Path("results").mkdir()
     assert main(["apply", "s.npz", "in.png", "height.npy", "-o", "results"]) == 0
     assert len(capsys.readouterr().err.splitlines()) == 2
-    # It is finished like the result, without an option.
+    # The image is finished like the result, without an option for it.
     assert (iio.imread("results/in.png") == iio.imread("out.png")).all()
     result = np.load("results/height.npy")
     assert result.dtype == np.float32

@@ -109,7 +109,7 @@ def test_hostile_arguments(here: Path, capsys: Capture, name: str) -> None:
     assert main([w for w in arguments if w or name in ("empty name", "size nothing")]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    # The work itself finds some of these errors, after its first progress line.
+    # Some of these errors are found during the work, after its first progress line, so ignore that line.
     lines = [line for line in err.splitlines() if line != "texrs: segment"]
     assert len(lines) == 1, err
     assert lines[0].startswith("texrs: ")
@@ -136,7 +136,7 @@ def test_outputs_are_checked_before_the_work(
 ) -> None:
     Path("folder.png").mkdir()
     before = files(here)
-    replace_design(monkeypatch, None)  # This would be an internal error.
+    replace_design(monkeypatch, None)  # Any work would fail with an internal error.
     assert main(["design", "in.png", "-o", name]) == 2
     assert NAMES[name] in complaint(capsys)
     assert main(["design", "in.png", "-o", "out.jpg", "--size", "16x65501"]) == 2

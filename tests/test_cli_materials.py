@@ -43,7 +43,7 @@ def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixtur
     for name, each in made.items():
         assert (io.read(f"new/rock_{name}.png") == each.pixels).all()
     assert (io.read("lit.png") == made.preview()).all()
-    # The result for one map equals that of apply, without options.
+    # ``texrs apply`` without options gives the same result for one map.
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
     assert main(["rerun", "new/rock_height.png", "-q"]) == 0
@@ -114,11 +114,11 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     assert (made["height"].pixels.shape) == texrs.SourceMap.load("map.npz").shape
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
-    # The record of a file depends on its format, not on the verb.
+    # Records depend on the format of a file and not on the verb, so all formats are tested with one verb only.
     again = ("new", "lit.png", "it.glb", "map.npz") if verb == "tile" else ("new",)
     for each in again:
         assert main(["rerun", each, "-q"]) == 0
-    # A material has two files.
+    # The folder of a material contains two files, so it has one line more than the other outputs.
     assert capsys.readouterr().out.count("the same bytes") == len(again) + 1
 
 

@@ -102,7 +102,7 @@ def test_messages_name_options_and_never_python(
     wrong = []
     for option in GROUP.get_command(None, command).params:
         flag = max(option.opts, key=len)
-        # Any text may be the name of a result.
+        # Skip options that name results, because any text is a valid name.
         if option.param_type_name != "option" or option.is_flag or "--out" in option.opts:
             continue
         if option.name in COMMON and command != "tile":
@@ -112,7 +112,7 @@ def test_messages_name_options_and_never_python(
             said = capsys.readouterr().err.strip().splitlines()
             if code == 0 or not said or "Work:" in said[-1]:
                 continue
-            # Quoted values are given by users, and names of samples and fields are their own words.
+            # Remove quoted values, which users gave, and lists of names, which may look like Python.
             plain = re.sub(r"'[^']*'|(?<=one of ).*|(?<=known are ).*", "", said[-1])
             if PYTHON.search(plain):
                 wrong.append((flag, value, said[-1]))

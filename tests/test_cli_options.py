@@ -39,7 +39,7 @@ def test_every_option_has_a_help_text(command: str) -> None:
         assert text, parameter.name
         assert text[0] == text[0].strip(), text
         assert text.endswith((".", ")")), text
-        # These words of signatures do not exist in a shell.
+        # Words of Python signatures must not occur, because they do not exist in a shell.
         assert not any(word in text for word in ("None", "`", "  ", "texrs.exemplar")), text
 
 
@@ -174,7 +174,7 @@ def test_a_docstring_says_what_an_option_is() -> None:
         "mode": "How. fine takes longer than --size says.",
         "colour": "Whether False.",
         "mirror": "Whether --no-mirror.",
-        # The command shows the 4 itself, but not a computed default.
+        # The command itself adds the default 4 to the help text, but not a computed default.
         "copies": "Number of copies.",
         "margin": "Width in pixels. Default: 1.5 times the example.",
         "knobs_width": "How wide, 1 to 9; see --mode. far is not near.",

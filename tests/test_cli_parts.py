@@ -84,7 +84,7 @@ def test_files_by_workers_and_after_a_stop(
     journal = files / f"{part.name}.json"
     assert journal.read_text().splitlines()[1:] == ["0", "1"]
     with journal.open("a") as file:
-        file.write("2")  # The chunk is cut off, so it is computed again.
+        file.write("2")  # The entry of chunk 2 is cut off, so the chunk is computed again.
     capsys.readouterr()
     assert main([*words, "--workers", "2"]) == 0
     assert "3 chunks, of which 2 were there" in capsys.readouterr().err
@@ -110,7 +110,7 @@ def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files:
         else:
             process.send_signal(number)
         assert process.stderr is not None
-        rest = process.stderr.read().decode()  # The pipe ends with the last worker.
+        rest = process.stderr.read().decode()  # Reading ends with the last worker.
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     assert "Traceback" not in rest
     there = {p: p.stat().st_mtime_ns for p in files.glob("a.zarr/0/c/*/*/*") if p.name.isdigit()}

@@ -198,7 +198,7 @@ def test_outputs_are_checked_before_the_work(
     for name, verb in (("texrs.tiling", "tile"), ("texrs.inpainting", "inpaint")):
         module = importlib.import_module(name)
 
-        # This would be an internal error.
+        # Arguments must be refused before the verb is called, so a call is an internal error.
         def fail(*arguments: object, **options: object) -> None:
             raise RuntimeError("the work has begun")
 

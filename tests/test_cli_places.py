@@ -129,7 +129,7 @@ def test_records_without_an_order_mean_rows_first(here: Path, capsys: Capture) -
         assert "the same bytes" in capsys.readouterr().out
     assert main(["info", "old.png"]) == 0
     assert "its places are row,column" in capsys.readouterr().out
-    # New records contain x,y, and are made again in the same way.
+    # New records contain places as x,y, and are repeated in the same way.
     words = " ".join(f"{column},{row}" for row, column in CORNERS)
     assert main(["rectify", "wall.png", "-o", "new.png", "--corners", words, "-q"]) == 0
     assert json.loads(io.read_metadata("new.png").made or "")["places"] == "x,y"

@@ -101,7 +101,7 @@ def test_bad_options_are_refused_before_the_work(
                 continue
             code = main([verb, *mode, *COMMANDS[command].split(), "-o", out, flag, value])
             said = capsys.readouterr().err.strip().splitlines()
-            # There must be one line that names the option, or its file.
+            # The message must have one line, which names the option or its file.
             if code != 2 or not said or not (flag in said[-1] or value in said[-1]):
                 late.append((flag, value, code, said))
     assert not late

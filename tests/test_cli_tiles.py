@@ -32,10 +32,10 @@ def test_the_set_is_what_engines_read(here: Path, tiles: texrs.CornerTiles, caps
     assert np.array_equal(io.read("set/image.png"), tiles.atlas)
     assert io.read("set/index.png").shape == (8, 12)
     assert {p.name for p in Path("set").iterdir()} >= {"tiles.glsl", "tiles.gdshader"}
-    assert main(words) == 0  # The command replaces its own files,
+    assert main(words) == 0  # The command replaces its own files.
     assert main(["rerun", "set", "-q"]) == 0
     assert capsys.readouterr().out.count("the same bytes") == 4
-    Path("set/tiles.glsl").write_text("mine")  # but not others.
+    Path("set/tiles.glsl").write_text("mine")  # Files of the user are kept.
     assert main(words) == 2
     assert "tiles.glsl was changed since" in capsys.readouterr().err
 

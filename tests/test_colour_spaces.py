@@ -100,7 +100,8 @@ def test_every_role_keeps_its_meaning(role: str, channels: int, dtype: str, tmp_
         step = 2.3 * max(FINE[dtype], FINE[stored])
         assert np.abs(decode(role, back.pixels) - truth).max() < step, (suffix, depth, stored)
         if stored == dtype:
-            # In EXR files, colours of floats are multiplied by alpha, and divided again on reading.
+            # In EXR files, float colours are multiplied by alpha when written and divided when read, so they are
+            # rounded.
             bound = (
                 suffix in (None, ".exr") and role in COLOURED and channels in (2, 4) and dtype in ("float16", "float32")
             )
@@ -127,7 +128,7 @@ def test_other_formats_of_colours(dtype: str, suffix: str, depth: Any, tmp_path:
     flat = np.ascontiguousarray(np.broadcast_to(encode("colour", 3, dtype)[:1, :1], (16, 16, 3)))
     Material({"albedo": flat}).save(tmp_path, suffix=suffix, depth=depth)
     back = decode("colour", Material.read(tmp_path)["albedo"].pixels)
-    # A file of .hdr has eight bits below the largest channel, and .jpg has fewer.
+    # Allow a large error, because .hdr and .jpg files have less than 8 bits for dark channels.
     assert np.abs(back - TRUTH[0, 0, :3]).max() < 0.02
 
 
@@ -159,7 +160,7 @@ def test_spaces_that_were_stated_hold_on_the_way_out(dtype: str, tmp_path: Path)
     for depth in (None, 8, 16, 32):
         material.save(tmp_path / str(depth), depth=depth)  # type: ignore[arg-type]
         back = Material.read(tmp_path / str(depth))["albedo"].pixels
-        # Half a linear step near black is many steps of sRGB, but little light.
+        # Compare light, because half a linear step near black is many steps of sRGB.
         assert np.abs(decode("colour", back) - TRUTH[..., :3]).max() < 2.3 * max(FINE[dtype], FINE[str(back.dtype)])
 
 
@@ -180,7 +181,7 @@ def test_values_that_integers_cannot_hold_are_reported(tmp_path: Path) -> None:
     assert (io.read(tmp_path / "albedo.png") == 255).all()
     bright.save(tmp_path, depth=32)
     assert (io.read(tmp_path / "albedo.exr") == 2).all()
-    # Doubles are not scaled to 0 to 1.
+    # Heights in float64 are not scaled to the range 0 to 1.
     Material({"height": np.array([[-2.0, 3.0]])}).save(tmp_path, depth=32)
     assert io.read(tmp_path / "height.exr").tolist() == [[-2, 3]]
 

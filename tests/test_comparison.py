@@ -53,14 +53,14 @@ def test_the_command_writes_one_whole_page(
             assert (attributes.get(name) or "#").startswith(("data:", "#")), (tag, name)
         assert tag != "img" or attributes["alt"]
     assert "prefers-color-scheme: dark" in text
-    # Missing programs are listed, with installation hints.
+    # Methods whose programs are missing are listed as well, with installation hints.
     for method in METHODS:
         assert method.name in text
 
 
 def test_what_is_installed_takes_part(monkeypatch: pytest.MonkeyPatch, program: Path) -> None:
     def fill(picture: np.ndarray, hole: np.ndarray, radius: int, flag: int) -> np.ndarray:
-        # No method sees the contents of the hole.
+        # The hole is grey, because no method may read its contents.
         assert (picture[hole > 0] == 128).all()
         return picture
 

@@ -193,7 +193,7 @@ def test_all_conventions_are_written_from_single_maps(key: str, tmp_path: Path) 
                 assert (channels[..., k] == words[word]).all(), (stem, word)
         seen |= set(file.role.quantities)
     assert {"normal", "opacity", "occlusion"} <= seen
-    # Reading it again loses nothing either.
+    # Reading the written files and writing them again loses nothing.
     again = Material.read(tmp_path / "out")
     again.save(tmp_path / "back", convention="ambientcg")
     for stem in ("Color", "Roughness", "Metalness", "AmbientOcclusion", "Displacement"):
@@ -349,7 +349,7 @@ def test_normals_turn_by_x_and_y_and_the_rest_stays(held: str, dtype: str) -> No
     for channel in range(2 if bare else 3, picture.shape[-1]):
         plain = result.source_map.render(np.ascontiguousarray(stored[..., channel]))
         assert (made[..., channel] == plain).all()
-    # The functions for arrays give the same.
+    # `texrs.apply` and `SourceMap.render` give the same result for arrays.
     again = texrs.apply(result.source_map, stored, map_type="normal", green="down")
     assert (again[..., :2] == made[..., :2]).all()
     assert (result.source_map.render(stored, map_type="normal", green="down") == again).all()
@@ -430,7 +430,7 @@ def test_the_surface_shows_whether_y_is_up(down: bool, height: bool, bare: bool,
     )
     io.write(tmp_path / "rock_albedo.png", DOTS.image)
     if height:
-        # Depths instead of heights show the same.
+        # A map of depths determines the direction of y as well as a map of heights.
         io.write(tmp_path / "rock_height.png", 255 - draw_channel("height"))
     material = Material.read(tmp_path)
     assert material["normal"].role.down is down
@@ -514,7 +514,7 @@ def test_what_is_shown_of_packed_maps_is_what_is_shown_of_plain_ones(tmp_path: P
     difference = np.abs(plain.preview().astype(int) - packed.preview())
     assert difference.mean() < 0.5
     assert difference.max() <= 8
-    # The features for decisions are also the same.
+    # Plain and packed maps also have the same features for decisions.
     for one, other in zip(plain.features()[1:2], packed.features()[1:2], strict=True):
         assert (one == other).all()
 
@@ -596,7 +596,7 @@ def test_layers_keep_packed_maps(tmp_path: Path) -> None:
     for name, each in material.items():
         assert again[name].role is each.role
         assert (again[name].pixels == each.pixels).all()
-    # No other program mistakes the occlusion for z.
+    # Channels are numbered, so that no other program mistakes the occlusion for z.
     assert {c for c in read_layers(tmp_path / "stack.exr")[0] if "_n." in c} == {f"1K_n.{k}" for k in range(4)}
 
 

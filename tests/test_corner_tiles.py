@@ -66,7 +66,7 @@ def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
     loose = mixed.reshape(12, 12, side, side, 3).transpose(0, 2, 1, 3, 4).reshape(image.shape)
     for axis in (0, 1):
         found, apart = (_measure_steps(each, axis, side) for each in (image, loose))
-        # If other tiles are neighbours, the difference is the largest at their edge.
+        # Next to tiles that do not match (``loose``), the difference is largest at the edge of a tile.
         assert apart[-1] == apart.max()
         assert found[-1] < min(1.5 * found.mean(), 0.7 * apart[-1])
     assert tiles.source_map.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
@@ -75,7 +75,7 @@ def test_tiles_agree_along_their_edges(tiles: texrs.CornerTiles) -> None:
 def test_the_source_map_shows_the_window(tiles: texrs.CornerTiles) -> None:
     made = tiles.window((FAR + 5, -77), (90, 130))
     shown = made.source_map.render(DOTS).astype(int)
-    # The rest are colours that the design blended.
+    # Larger differences are colours that the design blended.
     assert np.median(np.abs(shown - made.image)) <= 3
     assert made.source_map.shape == (90, 130)
     assert made.report["origin"] == [FAR + 5, -77]
@@ -147,7 +147,7 @@ def test_engines_read_what_is_saved(stones: texrs.CornerTiles, tmp_path: Path) -
             for row in index
         ]
     )
-    # The last row and column of the index continue at the first, although the plane continues otherwise.
+    # The index repeats after its last row and column, where the unbounded plane continues differently.
     assert np.array_equal(shown[: 7 * side, : 11 * side], stones[0 : 7 * side, 0 : 11 * side])
     assert "textureGrad(atlas" in (tmp_path / "tiles.glsl").read_text()
     assert "shader_type spatial" in (tmp_path / "tiles.gdshader").read_text()

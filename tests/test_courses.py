@@ -123,7 +123,7 @@ def test_joints_go_through_the_whole_texture(heights: tuple[int, int], wrap: boo
     assert unbroken > own - 0.03
     assert count >= 0.8 * 300 / heights[1]
     if wrap:
-        # The wrap contains whole courses.
+        # Courses are also whole where the image wraps.
         rolled, there = measure_joints(np.roll(made.image, 150, axis=0))
         assert there == count
         assert rolled == pytest.approx(unbroken, abs=0.01)
@@ -142,7 +142,7 @@ def test_the_map_of_a_turned_wall_leads_back_to_it() -> None:
     made = texrs.design(wall, 256, seed=3, screening=None)
     np.testing.assert_array_equal(made.source_map.render(wall), made.image)
     frames = made.source_map.jacobians()
-    # Level lines in the texture climb in the photograph.
+    # Level lines of the result are slanted in the photograph.
     climbs = np.degrees(np.arctan2(frames[..., 0, 1], frames[..., 1, 1] * np.sign(frames[..., 1, 1])))
     assert np.abs(np.abs(climbs) - 5).max() < 1.5
 

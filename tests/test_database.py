@@ -205,7 +205,7 @@ def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[
         assert sum("name: one exists already, with another image" in answer for answer in answers) == count - 1
         winner = answers.index("ok")
         assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
-    # The manifest, the entry and the pixels are of one image.
+    # The manifest, the entry and the pixels belong to the same image.
     assert (np.load(tmp_path / "db" / "one.npy") == textures["one"].image).all()
     assert textures.list()[0].hash == texrs.elements.hash_image(textures["one"].image)
     assert not said

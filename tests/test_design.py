@@ -40,7 +40,7 @@ def test_size_dtype_and_content(pebbles, result):
     assert result.image.shape == (160, 224, 3)
     assert result.image.dtype == np.uint8
     assert result.source_map.shape == (160, 224)
-    # Every colour is from the exemplar. At integer coordinates it is exactly that sample.
+    # All colours come from the exemplar. At integer coordinates, a colour equals the sample exactly.
     whole = (result.source_map.coordinates == np.rint(result.source_map.coordinates)).all(axis=-1)
     at = result.source_map.coordinates[whole].astype(int)
     np.testing.assert_array_equal(result.stages["before_blending"][whole], pebbles[at[:, 0], at[:, 1]])
@@ -135,7 +135,7 @@ def test_the_segmentation_is_shown_in_colours_on_the_exemplar(pebbles, channels)
     assert (shown[outline] == 255).all()
     ground = (truth == 0) & ~outline
     np.testing.assert_array_equal(shown[ground], np.broadcast_to(pebbles[..., channels], shown.shape)[ground])
-    # The colour of an element is independent of the stone's appearance.
+    # The tint of an element does not depend on the colours of the stone.
     tints = [(shown - 0.45 * pebbles[..., channels])[(truth == k) & ~outline] for k in range(1, truth.max() + 1)]
     assert max(t.std(axis=0).max() for t in tints if len(t)) < 1
     assert len({tuple(np.rint(t.mean(axis=0) / 4)) for t in tints if len(t)}) > 0.9 * len(tints)

@@ -252,7 +252,7 @@ def test_d2_fails_for_a_hard_cut_collage(pebbles, collage):
     source, image = collage
     found = checks.d2(pebbles, image, source)
     assert not found.passed, found
-    # A grid of squares has seams at one row or column in 24, on both sides of it.
+    # In a collage, one edge in 24 along each axis is a seam.
     assert found.seams == pytest.approx(1 / 24, abs=0.005)
 
 
@@ -323,7 +323,7 @@ def test_d4_leaves_a_patch_itself_out():
     at = checks.corners(image.shape, 20, 0)
     assert checks.nearest_patches(image, at, image).max() < 1e-3
     assert checks.nearest_patches(image, at, image, own=8).min() > 0.1
-    # Compare with a slow twin.
+    # Compare with a slow search.
     row, column = at[0]
     patch = image[row : row + 9, column : column + 9]
     apart = [
@@ -341,7 +341,7 @@ def test_d5_fails_for_copies_mirrored_or_moved(pebbles, shift, rows, columns):
     tile = np.roll(pebbles[::rows, ::columns], shift, (0, 1))
     image = np.tile(tile, (2, 2, 1))
     assert not checks.d5(pebbles, [image]).passed
-    # The same holds for one copy in an otherwise good texture.
+    # A single copy of the exemplar in an otherwise good texture also fails.
     good = made("pebbles", 0).image.copy()
     good[:128, 128:] = tile
     assert not checks.d5(pebbles, [good]).passed
@@ -400,7 +400,7 @@ def test_d8_fails_for_elements_lost_and_for_elements_shrunk(known_labels):
     where[lost] = (row, column)
     source, image = a_map(dots.image, where)
     assert not checks.d8(dots.image, image, source, labels).passed
-    # Use the whole image at half the size, four times.
+    # Four copies of the whole image at half the size have elements that are too small.
     source, image = a_map(dots.image, (cycle(dots.image, 160, 160) * 2) % 160)
     assert not checks.d8(dots.image, image, source, labels).passed
 
@@ -433,7 +433,7 @@ def test_d8_knows_a_median_as_well_as_its_elements_say():
     assert found.passed, found
     for wrong in (0.3, 2.5):
         assert not checks.census(sizes, 100, many * wrong * np.median(sizes) / np.median(many), 400).passed
-    # If all are equal, the median is certain.
+    # If all elements have the same area, the median is certain, so another median fails.
     alike = np.full(30, 400.0)
     assert not checks.census(alike, 100, np.full(120, 600.0), 400).passed
 
@@ -489,10 +489,10 @@ def test_d10_on_a_mixture_made_by_hand():
     found = checks.d10(several, image, source)
     assert found.passed, found
     assert found.entropy == pytest.approx(1, abs=0.01)
-    # One exemplar has nearly all squares.
+    # A mixture fails if nearly all squares are of one exemplar.
     source, image = mixture(several, np.where(order + np.arange(64).reshape(8, 8) % 9 == 0, 1, 0))
     assert not checks.d10(several, image, source).passed
-    # The map names the wrong exemplar.
+    # A map that names the wrong exemplars fails.
     source, image = mixture(several, order)
     wrong = SourceMap(source.coordinates, (source.exemplar + 1) % np.uint16(3), source.label, None, source.shapes)
     assert not checks.d10(several, image, wrong).passed

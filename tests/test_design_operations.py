@@ -128,7 +128,7 @@ def test_operations_are_obeyed_in_heaps():
         n: max((len(e["operations"]) for e in result.report["operations"][0][1:] if "place" in e), default=0)
         for n, result in made.items()
     }
-    # They are rotated and scaled to the shape of the other element, and so are elements on top of it.
+    # Stones that exchange places are rotated and scaled to each other's shape, together with stones on top of them.
     assert longest[0] == 0
     assert [longest[n] for n in (1, 2, 6)] == [2, 3, 7]
     assert len({result.image.tobytes() for result in made.values()}) == 4
@@ -155,7 +155,8 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
     size = np.diag([200.0, 232.0])
     times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
     assert np.abs(times - np.rint(times)).max() < 0.02
-    # Otherwise it is unchanged. Patches repeat in phase, by 1/6 of a period.
+    # Except for the stretch that closes the lattice, frames are unchanged. Patches repeat in phase, within 1/6 of a
+    # period.
     frames = np.abs(made.source_map.jacobians().reshape(-1, 2, 2)) - np.abs(np.linalg.inv(closing))
     assert np.abs(frames).max() < 0.01
     places = np.moveaxis(np.indices((200, 232)), 0, -1).astype(float)

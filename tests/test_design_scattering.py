@@ -68,7 +68,7 @@ def test_a_map_says_where_how_much_lies(grit, pebbles):
     result = texrs.design([grit, pebbles], SIZE, density=density, copies=1, wrap=False)
     lies = result.source_map.exemplar == 1
     assert lies.mean() == pytest.approx(0.15, rel=0.03)
-    # An element reaches over by less than half of its size.
+    # An element extends beyond its area by less than half of its size.
     assert lies[:, :100].mean() < 0.01
     assert lies[:, 124:].mean() > 0.25
 

@@ -124,7 +124,7 @@ def test_bad_images_are_errors(image: object) -> None:
 
 
 def test_a_stain_is_not_a_joint() -> None:
-    # Four tiles a row with dark joints; a soft stain covers a part of some of them.
+    # Draw rows of four tiles with dark joints. A soft stain covers parts of some tiles.
     rows, columns = np.mgrid[:160, :160]
     noise = np.random.default_rng(1).normal(0, 3, (160, 160))
     image = 150 + noise + 12 * ((rows // 40 + columns // 40) % 3)
@@ -139,7 +139,7 @@ def test_a_stain_is_not_a_joint() -> None:
 
 
 def test_the_upper_one_of_two_discs_is_known() -> None:
-    # Discs in rows, each over the ones before it.
+    # Draw discs in rows, each on top of the previous ones.
     rows, columns = np.mgrid[:200, :200]
     labels = np.zeros((200, 200), np.int32)
     shifts = np.random.default_rng(2).uniform(-5, 5, (36, 2))

@@ -477,7 +477,8 @@ def test_what_is_found_small_is_cut_small() -> None:
 @pytest.mark.parametrize("offset", [(0, 0), (2, -1)])
 def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -> None:
     image, centres, mask = discs()
-    # Use a mask of their off-centre middles, as a cut leaves if the background's colours claim the rest.
+    # Use a mask of the off-centre middles of the discs: a cut gives such a mask if the rest has colours of the
+    # background.
     middles = np.zeros_like(mask)
     for centre in centres.astype(int):
         row, column = centre + offset
@@ -488,7 +489,7 @@ def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -
     assert both > 0.9
     assert np.abs(found.points - centres).max() < 1.5
     assert max(found.box) == pytest.approx(2 * DISC + 1, abs=2)
-    # There is nothing to extend beyond the known mask, or if elements have different surroundings.
+    # The mask is not extended if it is already complete, or if elements have different surroundings.
     assert extend_mask(to_lab(image), found.mask, found.points, found.box, (False, False), sure=True) is None
     noise = np.random.default_rng(0).random(image.shape, np.float32)
     noise[middles] = 1

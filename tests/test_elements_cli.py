@@ -50,7 +50,7 @@ def test_a_material_is_analysed_by_all_its_maps(here: Path, capsys: Capture) -> 
     assert main(["analyse", "stuff", "-o", "e.npz", "--layout", "disjoint"]) == 0
     assert "stuff_wet.png not used" in capsys.readouterr().err
     found = elements.load("e.npz")
-    # Heights show the elements that colours do not. The entry contains the colours.
+    # Heights show elements that colours do not show. The entry contains the colours.
     assert (found.image == flat).all()
     assert len(found.points) >= 0.8 * len(DOTS.centres)
     assert main(["analyse", "stuff", "-o", "f.npz", "--layout", "disjoint", "--role", "stuff_wet=mask", "-q"]) == 0

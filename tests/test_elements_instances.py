@@ -45,7 +45,7 @@ def test_points_own_the_pieces_they_lie_in() -> None:
     assert ((ENTRY.labels > 0) == MASK).all()
     at = CENTRES.astype(int)
     assert ENTRY.labels[at[:, 0], at[:, 1]].tolist() == [1, 2, 3, 4, 5]
-    # The first two touch, and are separated halfway.
+    # The first two discs touch, and are separated halfway.
     assert ENTRY.labels[20, 26] == 1
     assert ENTRY.labels[20, 28] == 2
     assert ENTRY.labels[60, 78] == 6
@@ -84,7 +84,7 @@ def test_confidence_is_likeness_and_of_what_has_no_point_its_area() -> None:
     sure = [one.confidence for one in ENTRY.instances[:5]]
     assert sure[0] == 1
     assert sure == sorted(sure, reverse=True)
-    # The confidence is the share of correct elements at similarities of 1 to 0.5, where it is known.
+    # Confidences equal the shares of correct elements that were measured at similarities from 1 to 0.5.
     np.testing.assert_allclose(sure, [1, 0.97, 0.8, 0.31, 0.05], atol=0.02)
     assert ENTRY.instances[5].confidence > 0.95
     radii = np.array([RADIUS] * 5 + [RADIUS * 0.7])
@@ -106,7 +106,7 @@ def test_around_cyclic_borders_elements_are_whole() -> None:
     centres = np.array([[2.0, 40], [94, 50], [50, 1], [50, 50]])
     mask = draw_discs(centres, np.array([RADIUS] * 4), wrap=True)
     entry = make_entry(centres, mask, wrap=(True, True))
-    # The first two touch across the border, and are separated there.
+    # The first two discs touch across the border, and are separated there.
     assert len(entry.instances) == 4
     assert entry.labels[92, 38] == 1
     assert entry.labels[4, 52] == 2

@@ -45,7 +45,7 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     made = texrs.extend(above, right=40, view=PlaneView(plane=floor, ground=low), seed=1)
     new = made.image[:, 200:].astype(int)
     blue = new[..., 2] > new[..., 0] + 40
-    # The line between them continues.
+    # The line between the two planes continues in the added part.
     y, x = np.indices((160, 240))[:, :, 200:]
     line = y - 0.12 * (x - 100) - 0.47 * 160
     assert blue[line < -4].mean() > 0.99

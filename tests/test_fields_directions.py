@@ -62,7 +62,7 @@ def test_order_up_extent_and_missing_directions() -> None:
     tilted = fields.from_directions(WOUND, up=(1, 0.2, 0)).lattice(Z.shape, jacobians=False)
     assert angle(tilted[..., 2], WOUND) < 0.05
     assert angle(tilted[..., 0], np.broadcast_to([1, 0.2, 0], WOUND.shape)) < 12
-    # The direction is up itself.
+    # The directions are parallel to ``up``.
     everywhere = fields.from_directions(np.broadcast_to([1.0, 0, 0], (4, 4, 4, 3)), up=(1, 0, 0))
     assert np.allclose(np.linalg.det(everywhere.lattice((4, 4, 4))), 1, atol=1e-4)
 

@@ -105,7 +105,8 @@ def test_filling_continues_the_texture():
 
 
 def test_large_elements_are_not_torn_at_the_far_border():
-    # Stripes are wider than a patch. Filled row by row, the last patches would meet the lower border without a choice.
+    # Stripes are wider than a patch. If the hole were filled row by row, the last patches would not fit the lower
+    # border.
     rows, columns = np.indices((160, 160))
     image = np.where((columns + rows // 3) % 56 < 28, 200, 40).astype(np.uint8)
     hole = np.zeros(image.shape, bool)
@@ -123,7 +124,7 @@ def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
     r, c = np.indices(row.shape)
     near = np.hypot(row - r, column - c) < 10
     assert (near & turned & hole).sum() < 0.02 * hole.sum()
-    # No position is shown by more than a few patches of such a hole.
+    # Few positions are copied more than twice.
     used = np.bincount((row * 160 + column)[hole])
     assert (used > 2).sum() < 0.1 * hole.sum()
 
@@ -164,7 +165,7 @@ def test_sources_of_floats_are_compared_in_one_range():
     ramp = np.tile(np.linspace(0, 10, 48, dtype=np.float32), (48, 1))
     hole = disc((48, 48))
     result = texrs.inpaint(ramp, hole, exemplar=ramp * 2)
-    # Scaled by its own range, the doubled ramp would look like the ramp itself.
+    # Both images share one scale: scaled by its own range, the doubled ramp would look like the ramp itself.
     assert np.abs(result.image - ramp)[hole].mean() < 1
 
 
@@ -187,7 +188,7 @@ def test_mirrored_patches_turn_normals():
     assert turned.any()
     plain = texrs.inpaint(PEBBLES, HOLE, allow_mirror=False).source_map
     assert (plain.jacobians() == np.eye(2)).all()
-    # Coordinates along a patch follow its frame.
+    # Inside a patch, the step between coordinates follows the patch's frame.
     joined = result.source_map.is_coherent(1)[:, :-1]
     same = result.source_map.label[:, 1:] == result.source_map.label[:, :-1]
     assert joined[same].all()
@@ -256,8 +257,8 @@ def test_seams_are_judged_by_what_patches_show_beyond_them():
         colours = np.where(label[..., np.newaxis] > 0, stripes[row, column], stripes)
         costs.append(judge_seams(Filled(colours, label, moved, frames), stripes, free, (False, False)))
     assert costs[0] == costs[1] == 0
-    # There are 12 pixels above and below, and 8 on either side. Half of them differ after a shift by one step, all
-    # after two.
+    # The patch has 40 pairs of pixels at its border: 12 above, 12 below and 8 on each side. Half of the pairs differ
+    # after a shift by one step, and all differ after two.
     assert costs[2] == pytest.approx(20)
     assert costs[3] == pytest.approx(40)
 
@@ -284,7 +285,7 @@ def test_holes_far_from_the_corner_are_filled_from_what_is_around_them():
     hole = np.zeros(picture.shape[:2], bool)
     hole[500:540, 700:760] = True
     result = texrs.inpaint(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole)
-    np.testing.assert_array_equal(result.image, picture)  # The image is periodic.
+    np.testing.assert_array_equal(result.image, picture)  # The image is periodic, so the filling is exact.
     row, column = places(result)
     np.testing.assert_array_equal(result.image, picture[row, column])
     assert not hole[row, column].any()

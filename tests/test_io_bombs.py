@@ -41,7 +41,7 @@ def info(path):
 
 readers = {
     "read": io.read, "read_volume": io.read_volume,
-    # They read these files under any suffix.
+    # The following readers accept these files under any suffix.
     "read_vectors": partial(io.read_vectors, limit=2**22), "read_arrays": partial(io.read_arrays, limit=2**22),
     "read_headers": io.read_headers, "read_notes": io.read_metadata, "SourceMap": texrs.SourceMap.load,
     "Exemplar": texrs.Exemplar.load, "elements": elements.load, "database": database, "info": info,
@@ -151,7 +151,7 @@ def test_no_reader_takes_much_memory_for_a_small_file(tmp_path):
     rows = [line.split(maxsplit=4)[1:] for line in done.stdout.splitlines() if line.startswith("measured ")]
     assert len(rows) == 11 * len(made)
     assert [row for row in rows if int(row[0]) > MOST] == []
-    # Only their headers may be read.
+    # Readers that succeed may only have read headers.
     assert {row[2] for row in rows if row[3] == "read"} <= {"read_headers", "read_notes", "info"}
 
 

@@ -61,7 +61,7 @@ def test_compressed_dds(tmp_path, layout):
         expected = np.asarray(opened)
     back = tio.read(path)
     assert_array_equal(back, expected if layout != "DXT1" or back.shape[2] == 4 else expected[..., :3])
-    # Blocks of opaque colours have no alpha of their own.
+    # Opaque colours in compressed blocks are read without alpha.
     path.write_bytes(make.pillow(COLOURS, "DDS", pixel_format=layout))
     assert tio.read(path).shape == (24, 20, 3)
 
@@ -163,7 +163,7 @@ def test_gif_is_written_with_up_to_256_colours(tmp_path):
 def test_inks_become_srgb(tmp_path, kind):
     path = tmp_path / "a"
     if kind == "PSD":
-        # PSD stores them inverted.
+        # PSD stores inks inverted.
         path.write_bytes(make.psd(255 - INKS, mode=4))
     else:
         options = {"compression": "tiff_lzw"} if kind == "TIFF LZW" else {"quality": 100} if kind == "JPEG" else {}
@@ -188,9 +188,9 @@ def test_inks_are_converted_by_their_profile(tmp_path, kind):
     path.write_bytes(make.pillow(inks, kind, mode="CMYK", icc_profile=profile))
     back, notices = read_with_notices(path)
     assert notices.assumed == [f"{path}: CMYK converted to sRGB by its profile"]
-    # CIELAB (65, 40, 60) is this orange. The formula gives cyan.
+    # The profile maps this ink to CIELAB (65, 40, 60), which is an orange. Pillow's formula would give cyan.
     assert_allclose(back[8, 8].astype(int), (239, 127, 43), atol=6)
-    # The profile of inks is not written with the converted colours.
+    # The profile of the inks does not apply to the converted colours, so it is not written.
     assert tio.read_metadata(path).fit(3).profile is None
 
 
@@ -327,13 +327,13 @@ def test_pages_of_other_sizes_are_reported(tmp_path):
         InputWarning, match=r"pages.tif: 1 of 2 pages not used: they do not form a stack with the first page"
     ):
         assert_array_equal(tio.read(path), COLOURS)
-    # Pages of one size need not be a stack.
+    # Pages of the same size do not always form a stack.
     with tifffile.TiffWriter(path) as writer:
         for _ in range(3):
             writer.write(COLOURS, photometric="rgb")
     with pytest.warns(InputWarning, match=r"2 of 3 pages not used: they do not form a stack with the first page"):
         assert_array_equal(tio.read(path), COLOURS)
-    # A thumbnail is the same image.
+    # A page with a thumbnail is not reported, because it shows the same image.
     tifffile.imwrite(path, COLOURS, photometric="rgb", metadata=None)
     tifffile.imwrite(path, make.picture((9, 8)), append=True, metadata=None, subfiletype=1)
     assert_array_equal(tio.read(path), COLOURS)
@@ -385,7 +385,7 @@ def test_a_hole_that_is_filled_may_go_to_jpeg(tmp_path, capsys):
     words = [str(tmp_path / "a.png"), str(tmp_path / "hole.png"), "-o", str(tmp_path / "out.jpg")]
     assert main(["inpaint", *words]) == 0
     assert tio.read(tmp_path / "out.jpg").shape == (64, 64, 3)
-    # A design of an image with holes has holes, so JPEG is refused before the work.
+    # A design of an image with transparent pixels also has transparency, so JPEG is refused before the work begins.
     assert main(["design", str(tmp_path / "a.png"), "-o", str(tmp_path / "no.jpg")]) == 2
     assert "cannot store uint8 with 4 channels" in capsys.readouterr().err
 

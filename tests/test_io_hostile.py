@@ -70,7 +70,7 @@ def test_files_that_are_cut_off(files, name, tmp_path):
     for length in {*np.linspace(1, len(file) - 1, 60).astype(int).tolist(), len(file) - 1}:
         path.write_bytes(file[:length])
         with suppress(FileError):
-            # The cut part may not have been pixels. Then all of them must be there.
+            # If a truncated file can be read, the missing bytes were not pixels, so all pixels must be correct.
             np.testing.assert_array_equal(tio.read(path), whole, str(length))
 
 
@@ -91,7 +91,7 @@ def test_corrupt_files(files, name, tmp_path, capfd):
     assert sentences
     assert all(s.startswith(str(path)) and "\n" not in s for s in sentences)
     said = capfd.readouterr()
-    # The package OpenEXR prints its own lines about a damaged file.
+    # The package OpenEXR prints its own lines about a damaged file, so ignore them.
     lines = [] if name.endswith(".exr") else said.err.splitlines()
     assert (said.out, lines) == ("", [])
 
@@ -273,7 +273,7 @@ def test_damaged_stores_and_encodings_are_refused_in_a_sentence(tmp_path):
     data, chain = bytearray(path.read_bytes()), [4]
     while at := int.from_bytes(data[chain[-1] : chain[-1] + 4], "little"):
         chain.append(at + 2 + 12 * int.from_bytes(data[at : at + 2], "little"))
-    # The last page leads to the third, in an endless circle.
+    # Link the last page to the third one, which forms an endless circle.
     data[chain[-1] : chain[-1] + 4] = data[chain[2] : chain[2] + 4]
     path.write_bytes(data)
     with pytest.raises(FileError, match="in a circle"):

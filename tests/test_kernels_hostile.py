@@ -312,7 +312,8 @@ def test_a_hostile_argument_gives_a_result_or_is_named(name: str, argument: str,
         call(**given)
     except TexrsError as error:
         said = str(error)
-    # Numbers that are valid by themselves may be refused because they do not fit the others.
+    # Numbers that are valid by themselves may be refused because they do not fit other arguments, which the message
+    # may name instead.
     alone = not isinstance(value, np.ndarray | list | tuple | int | float)
     names = (*((argument,) if alone else arguments), *ALSO.get(name, ()))
     assert not said or any(re.search(rf"\b{n}\b", said) for n in names), said

@@ -117,7 +117,7 @@ for call in sys.argv[2:]:
 
 def run(calls: dict[str, str], sizes: tuple[int, ...]) -> list[list[str]]:
     plain = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
-    # Freed memory returns to the system, and cannot be used again.
+    # Return freed memory to the system, so that it cannot be used again.
     plain |= {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
     given = [" ".join(map(str, sizes)), *(f"{name}|{call}" for name, call in calls.items())]
     ran = subprocess.run([sys.executable, "-c", SCRIPT, *given], env=plain, capture_output=True, text=True, timeout=600)
@@ -131,6 +131,6 @@ def test_kernels_that_find_no_room_say_so():
     assert len(lines) == len(KERNELS) * len(MEGABYTES)
     bad = [line for line in lines if line[2] != "0" or line[3] not in ("done", "LimitExceeded", "MemoryError")]
     assert not bad, bad
-    # Each kernel was refused once, and had enough memory in the end.
+    # Each kernel ran out of memory at least once, and finished at least once.
     assert {line[0] for line in lines if line[3] == "LimitExceeded"} == KERNELS.keys()
     assert {line[0] for line in lines if line[3] == "done"} == KERNELS.keys()

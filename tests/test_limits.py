@@ -85,7 +85,7 @@ def test_the_least_of_what_is_said_holds(monkeypatch):
         assert limits.current().seconds is None
     limits.set(pixels=2**30)
     monkeypatch.delenv("TEXRS_PIXELS")
-    # More than the default can be requested.
+    # A limit above the default can be set.
     assert limits.current().pixels == 2**30
 
 
@@ -163,7 +163,7 @@ def test_more_takes_more():
     assert limits.estimate_memory("tile", np.shape(DOTS)) == limits.estimate_memory(
         "tile", [list(DOTS.shape)], (64, 64)
     )
-    # A machine of 32 GB does not begin with an image of 16384 x 16000.
+    # A machine with 32 GB refuses an image of 16384 x 16000 pixels before the work begins.
     assert limits.estimate_memory("perspective", (512, 512, 3), (16384, 16000)) > 32e9
 
 

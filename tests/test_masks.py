@@ -220,7 +220,7 @@ def test_a_softly_erased_hole_keeps_nothing_of_the_brush(dtype: type) -> None:
     assert not is_magenta(made.image / full * 255).any()
     assert (made.image[..., 3] == full).all()
     assert made.report["filled"] == (soft[..., 3] < 255).mean()
-    # A threshold keeps pixels that are hardly transparent.
+    # With a threshold, pixels that are hardly transparent are kept.
     kept = texrs.inpaint((soft / 255 * full).astype(dtype), Mask("alpha", threshold=0.5))
     assert kept.report["filled"] == pytest.approx((alpha <= 0.5).mean(), abs=0.01)
 
@@ -245,7 +245,7 @@ def test_a_feathered_filling_fades_into_the_image() -> None:
     weight = np.rint(255 * fade(DISC, 5)) / 255
     expected = np.rint(weight * composite + (1 - weight) * base)
     np.testing.assert_array_equal(made.image[wide & ~DISC], expected[wide & ~DISC])
-    # Other maps fade in the same way. Labels do not mix.
+    # Other maps fade in the same way, except labels, which are not mixed.
     np.testing.assert_array_equal(texrs.apply(made.source_map, base), made.image)
     labels = (COLUMNS // 8).astype(np.uint8)
     assert np.isin(texrs.apply(made.source_map, labels, map_type="label"), labels).all()
@@ -395,7 +395,7 @@ def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Captur
     assert "heights.tif: its georeference is not written, because only TIFF holds it" in capsys.readouterr().err
     assert main(["inpaint", "heights.tif", "hole.png", "-o", "other.exr", "--strict"]) == 2
     assert not Path("other.exr").exists()
-    # The pixels of other results have other positions.
+    # A design has pixels at other positions, so it does not keep the georeference.
     assert main(["design", "in.png", "-o", "new.tif", "-q"]) == 0
     assert read_tags("new.tif") == {}
 

@@ -94,7 +94,7 @@ def test_normals_turn_and_keep_their_length(plan: Literal["still", "move"], most
     assert made is not None
     vectors = made["normal"].pixels.astype(np.float64) / 65535 * 2 - 1
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=-1), 1, atol=2e-3)
-    # They are still the normals of the heights away from seams, because both were mirrored and rotated.
+    # Away from seams, the normals still fit the heights, because both maps were mirrored and rotated.
     down, right = np.gradient(made["height"].pixels * 8)
     expected = np.stack([-right, down, np.ones_like(down)], axis=-1)
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -251,12 +251,12 @@ def test_bad_materials_are_refused() -> None:
 
 def test_vectors_turn_with_what_they_lie_on() -> None:
     source = texrs.SourceMap.identity((8, 8))
-    quarter = np.array([[0, 1], [-1, 0]], np.float32)  # A step down shows one to the left.
+    quarter = np.array([[0, 1], [-1, 0]], np.float32)  # A step down is a step to the left in the exemplar.
     turned = texrs.SourceMap(source.coordinates, source.exemplar, source.label, quarter[np.newaxis], source.shapes)
     flow = np.zeros((8, 8, 2), np.float32)
-    flow[..., 0] = -1  # Left, as signed values.
+    flow[..., 0] = -1  # The vectors point to the left, and are not encoded.
     made = Material({"flow": flow}).apply(turned)["flow"].pixels
-    np.testing.assert_allclose(made[4, 4], [0, -1], atol=1e-6)  # Down, where y points up.
+    np.testing.assert_allclose(made[4, 4], [0, -1], atol=1e-6)  # They point down, because y points up.
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert (Material({"flow": flow}).apply(source)["flow"].pixels == flow).all()

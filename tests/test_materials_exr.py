@@ -140,7 +140,7 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
     assert {name: each.role for name, each in back.items()} == {"Color": Role.COLOUR, "Normal": Role.NORMAL}
     assert (back["Color"].pixels == np.stack(list(colours.values()), axis=-1)).all()
     assert (back["Normal"].pixels[..., 2] == one + 2).all()
-    # A part without a layer is an image; other parts are layers.
+    # A part whose channels do not have a layer is an image. Other parts are layers.
     parts = [({"name": "colour"}, colours), ({"name": "height"}, {"Z": one.astype(np.float16)})]
     back = Material.read(write(tmp_path / "b.exr", parts))
     assert back["height"].pixels.dtype == np.float16
@@ -267,7 +267,7 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
         Material.read(path, axes=3)
     with pytest.raises(InvalidInput, match="must not be a volume"):
         Material({"albedo": np.zeros((4, 4, 4), np.uint8)}, axes=3).save_exr(tmp_path / "b.exr")
-    # The header may contain nonsense.
+    # An invalid description in the header is ignored.
     one = draw("float32")
     for words in ("{", "[]", '{"maps": {"height": {"role": "height", "space": "srgb", "dtype": "O", "channels": 0}}}'):
         write(tmp_path / "words.exr", [({"texrs": words}, {"height.Y": one})])

@@ -52,7 +52,7 @@ def test_more_flowers_are_no_more_light() -> None:
     spots = picture[..., 0] > 100
     even = flatten_lighting(picture).astype(float)
     assert np.abs(even - picture).max() < 12
-    # They become equal under uneven light.
+    # In uneven light, the brightness of the spots becomes more equal.
     lit = (picture * (0.6 + 0.35 * COLUMN / COLUMNS)[..., np.newaxis]).astype(np.uint8)
     better = flatten_lighting(lit).astype(float)
     assert better[spots].std() / better[spots].mean() < 0.35 * lit[spots].std() / lit[spots].mean()

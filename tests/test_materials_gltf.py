@@ -153,11 +153,11 @@ def test_files_obey_the_standard_and_hold_the_maps(suffix: str, tmp_path: Path) 
     packed = pictures["orm"]
     assert (packed == np.dstack([GREYS, STONES[..., 1], 255 * (STONES[..., 2] > 128)])).all()
     assert material["occlusionTexture"] == material["pbrMetallicRoughness"]["metallicRoughnessTexture"]
-    # Green is inverted. The rest are the normals, with unit length.
+    # Green is inverted. Otherwise the normals are unchanged, with unit length.
     expected = FULL["normal_dx"].pixels.copy()
     expected[..., 1] = 255 - expected[..., 1]
     assert np.abs(pictures["normal"].astype(int) - expected).max() <= 1
-    # Values above white become a strength next to the image.
+    # Light above white is stored as a factor next to the image.
     strength = material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"]
     assert strength == FULL["emission"].pixels.max()
     light = np.where(pictures["emission"] > 10, ((pictures["emission"] / 255 + 0.055) / 1.055) ** 2.4, 0) * strength
@@ -175,7 +175,7 @@ def test_other_libraries_read_it(suffix: str, tmp_path: Path) -> None:
         assert (np.array(material.baseColorTexture)[..., :3] == STONES).all()
         assert material.metallicRoughnessTexture.size == (64, 48)
         assert material.normalTexture.size == material.emissiveTexture.size == (64, 48)
-    # It reads rows from below.
+    # trimesh counts rows from below, so compare only the range of the coordinates.
     assert np.ptp(scene.geometry["plane"].visual.uv, axis=0).tolist() == [3, 3]
     ball = scene.geometry["sphere"]
     ball.merge_vertices(merge_tex=True, merge_norm=True)
@@ -206,7 +206,7 @@ def test_tangents_are_how_pictures_lie(make: Any) -> None:
     def cosines(u: Array, v: Array) -> Array:
         return (u * v).sum(axis=1) / np.linalg.norm(u, axis=1) / np.linalg.norm(v, axis=1)
 
-    # Between the poles, a triangle's sides are meaningful.
+    # Leave out triangles at the poles, whose sides have no clear directions.
     middle = np.abs(corners[..., 1]).max(axis=1) < 0.95 if make is make_sphere else slice(None)
     assert (cosines(along, tangents[:, :3])[middle] > 0.99).all()
     assert (cosines(-down, up)[middle] > 0.99).all()
@@ -233,7 +233,7 @@ def test_what_is_not_there_is_not_written(tmp_path: Path) -> None:
         assert "alphaMode" not in material
         assert ("occlusionTexture" in material) == ("orm" in names)
     assert list(tmp_path.iterdir()) == [tmp_path / "a.glb"]
-    # Metal is 0 if only roughness is known.
+    # The blue channel, metallic, is 0 if only roughness is known.
     assert (pictures["roughness_metallic"][..., 2] == 0).all()
     soft = np.dstack([STONES, GREYS])
     document, _ = check_rules(Material({"albedo": soft}).save_gltf(tmp_path / "a.glb", shapes=["sphere"])[0])

@@ -26,7 +26,7 @@ def check(path: Path) -> tuple[dict[str, Any], dict[str, Path]]:
     """Return the inputs of the surface and the files of its images, for a valid document that compiles to a shader."""
     document = MaterialX.createDocument()
     MaterialX.readFromXmlFile(document, str(path))
-    # With the library imported, its graphs also belong to the document.
+    # List the graphs before the library is imported, because its graphs then also belong to the document.
     graphs = document.getNodeGraphs()
     document.setDataLibrary(LIBRARY)
     valid, message = document.validate()
@@ -51,7 +51,7 @@ def check(path: Path) -> tuple[dict[str, Any], dict[str, Path]]:
         assert wanted is not None, f"{given.getName()}: no such input"
         assert wanted.getType() == given.getType()
         assert given.getValueString() or given.getConnectedOutput() is not None
-    # Inputs that cannot be connected would fail here.
+    # The shader generator fails if an input cannot be connected.
     generator = PyMaterialXGenGlsl.GlslShaderGenerator.create()
     context = PyMaterialXGenShader.GenContext(generator)
     context.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())

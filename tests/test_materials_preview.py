@@ -35,7 +35,7 @@ def test_a_flat_dull_surface_shows_its_own_colours() -> None:
     shown = shine({"albedo": COLOURS, "roughness": np.full((ROWS, COLUMNS), 255, np.uint8)})
     assert np.abs(shown - COLOURS)[COLOURS > 40].max() <= 12
     assert np.abs(shown - COLOURS).mean() < 5
-    # The order of greys stays.
+    # Brighter greys are never rendered darker.
     ramp = np.repeat(np.arange(256, dtype=np.uint8)[np.newaxis], 4, axis=0)
     assert (np.diff(shine({"albedo": ramp})[0, :, 0]) >= 0).all()
 
@@ -63,7 +63,7 @@ def test_both_kinds_of_green_mean_the_same_surface() -> None:
     up = shine({"albedo": COLOURS, "normal": NORMAL})
     assert (up == shine({"albedo": COLOURS, "normal_dx": turned})).all()
     assert np.abs(up - shine({"albedo": COLOURS, "normal": turned})).max() > 40
-    # Floats mean the same with and without a sign.
+    # Normals as floats give the same image in the range 0 to 1 and in the range -1 to 1.
     unit = NORMAL / np.float32(65535)
     for floats in (unit, unit * 2 - 1):
         assert np.abs(up - shine({"albedo": COLOURS, "normal": floats.astype(np.float32)})).max() <= 1
@@ -127,7 +127,7 @@ def test_tiles_and_sizes() -> None:
     assert four.shape == (2 * ROWS, 2 * COLUMNS, 3)
     assert (four == np.tile(one, (2, 2, 1))).all()
     assert shine(maps, tiles=(1, 3), side=96).shape == (24, 96, 3)
-    # Averages are averages of light.
+    # Reduced pixels are averages of linear light, so half of the light of level 188 is level 137.
     half = shine({"albedo": np.indices((32, 32)).sum(axis=0).astype(np.uint8) % 2 * 188}, side=16)
     even = shine({"albedo": np.full((4, 4), 137, np.uint8)})
     assert np.abs(half - even[0, 0]).max() <= 2

@@ -131,7 +131,7 @@ def test_normals_keep_their_length(dtype: str, role: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(values, axis=-1), 1, atol=1e-2)
     mean = normal.reshape(8, 2, 12, 2, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(values, mean / np.linalg.norm(mean, axis=-1, keepdims=True), atol=2e-2)
-    # Floats that are shares stay shares.
+    # Floats that encode components as 0 to 1 keep this encoding.
     unit = ((normal + 1) / 2).astype(np.float32)
     np.testing.assert_allclose(
         levels(unit, role)[0] * 2 - 1, mean / np.linalg.norm(mean, axis=-1)[..., None], atol=1e-5

@@ -23,7 +23,7 @@ def test_agrees_with_the_naive_twin(shape, radius, limit, iterations, wrap, seed
     options = {"max_iterations": iterations, "tolerance": 1.01, "wrap": wrap}
     result = mean_shift(image, radius, limit, **options)
     expected = reference.mean_shift(image, radius, limit, **options)
-    # A colour at the border of a ball may fall on either side, depending on rounding.
+    # A colour at the limit of the range may count or not, depending on rounding.
     assert np.mean(np.abs(result - expected) < 1e-2) > 0.98
 
 

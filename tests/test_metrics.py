@@ -16,7 +16,7 @@ GENERATED = ("pebbles", "beans", "leaves_and_flowers", "dots")
 PHOTOGRAPHS = {
     "gravel": (slice(0, 192), slice(0, 192)),
     "brick": (slice(0, 192), slice(0, 192)),
-    # Coins in rows, each different.
+    # This crop shows rows of different coins.
     "coins": (slice(20, 220), slice(20, 220)),
 }
 NAMES = (*GENERATED, *PHOTOGRAPHS)

@@ -16,7 +16,7 @@ from texrs import _napari, elements, io, samples
 from texrs.errors import FileError
 
 with warnings.catch_warnings():
-    # npe2 lags behind the newest pydantic.
+    # npe2 causes warnings of the newest pydantic.
     warnings.simplefilter("ignore")
     npe2 = pytest.importorskip("npe2")
     from npe2 import _pytest_plugin as harness

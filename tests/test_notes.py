@@ -124,7 +124,7 @@ def test_what_other_writers_say_is_read(tmp_path: Path) -> None:
         found = io.read_metadata(path)
         assert found.profile == PROFILE, suffix
         if more:
-            # Reading turns the image upright, together with its density.
+            # Reading turns the image upright, which also exchanges its two densities.
             assert found.density == pytest.approx((72 / 0.0254, 144 / 0.0254), rel=1e-3), suffix
     chunks = b"gAMA" + struct.pack(">I", 100_000), b"sRGB\0"
     plain = streams.BytesIO()

@@ -93,7 +93,7 @@ def test_files_go_around(baked: texrs.painting.TexturedMesh, tmp_path: Path) -> 
     there = trimesh.load(tmp_path / "ball.glb", force="mesh", process=False)
     assert np.allclose(there.visual.uv, baked.uv, atol=1e-5)
     assert np.array_equal(np.asarray(there.visual.material.baseColorTexture)[..., :3], baked.maps["image"])
-    again = texture_mesh(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # It keeps its own atlas.
+    again = texture_mesh(tmp_path / "ball.glb", TEXTURE, scale=1.0, atlas=64)  # The mesh keeps its own atlas.
     assert np.allclose(again.uv, baked.uv, atol=1e-5)
 
 
@@ -130,7 +130,7 @@ def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
     for image in said["images"]:
         view = said["bufferViews"][image["bufferView"]]
         picture = data[start + view["byteOffset"] :][: view["byteLength"]]
-        assert picture[24] == 16  # Bits of a sample, in the PNG header.
+        assert picture[24] == 16  # This byte of the PNG header is the number of bits.
     attributes = said["meshes"][0]["primitives"][0]["attributes"]
     assert set(attributes) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0"}
 
@@ -138,7 +138,7 @@ def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
 def carved(vectors: np.ndarray, role: str = "normal", **options: object) -> texrs.SolidTexture:
     """Return a texture of a material with the same normals everywhere."""
     normals = np.broadcast_to(np.float32(vectors), (24, 24, 24, 3)).copy()
-    normals[0, 0, 0] = -normals[0, 0, 0]  # Some are negative, so they are not encoded.
+    normals[0, 0, 0] = -normals[0, 0, 0]  # Negative values show that normals are not encoded.
     return texrs.SolidTexture(texrs.Material({"albedo": STRIPES, "n": normals}, roles={"n": role}, axes=3), **options)
 
 

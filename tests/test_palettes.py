@@ -105,7 +105,7 @@ def test_pictures_of_many_colours_are_left_alone():
 
 def test_a_file_with_a_palette_is_known_by_it(tmp_path):
     rng = np.random.default_rng(0)
-    # These are as many colours as a palette has. Only the file shows that it is not a photograph.
+    # The image has 256 colours, so only the palette in the file shows that it is not a photograph.
     table = rng.integers(0, 256, (256, 3), np.uint8)
     image = Image.fromarray(rng.integers(0, 256, (64, 64), np.uint8))
     image.putpalette(table.tobytes())

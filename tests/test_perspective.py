@@ -25,7 +25,7 @@ def test_the_map_is_the_picture(floor):
     assert result.image.shape == (64, 80, 3)
     assert result.image.dtype == floor.image.dtype
     np.testing.assert_array_equal(result.source_map.render(floor.image, antialias=True), result.image)
-    # Unshrunk pixels are only looked up.
+    # Pixels that are not shrunk are only looked up.
     whole = np.abs(np.linalg.det(result.source_map.jacobians())) <= 1
     assert 0.2 < whole.mean() < 1
     np.testing.assert_array_equal(view(result.source_map, floor.image)[whole], result.image[whole])

@@ -54,7 +54,7 @@ def test_the_papers_method_follows_the_scale_too():
     target = checks.targets(scale, (96, 96))["ramp"]
     result = texrs.perspective(small, scale, 96, target=target, method="paper", seed=1)
     assert checks.fidelity(result.image, target)[0] >= 0.9
-    # Averages create colours that the exemplar does not have. The composite has none.
+    # Averages create colours that the exemplar does not have. The stage before blending does not have such colours.
     known = np.unique(small.reshape(-1, 3), axis=0)
     made = np.unique(result.image.reshape(-1, 3), axis=0)
     assert len(np.unique(np.concatenate([known, made]), axis=0)) > len(known)

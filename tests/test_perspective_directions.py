@@ -53,7 +53,7 @@ def test_directions_may_change_from_pixel_to_pixel(lines):
     angles = 50 * np.sin(2 * np.pi * x / SIDE)
     made = texrs.perspective(lines, "front", direction=angles, size=SIDE, seed=1)
     assert np.median(apart(measure_directions(made.image, 4.0)[INNER], angles[INNER])) < 8
-    # Directions of another size are stretched, also across whole turns.
+    # A map of directions of another size is stretched, also across the jump from 350 to 10 degrees.
     coarse = np.array([[350.0, 10.0]])
     level = texrs.perspective(lines, "front", SIDE, direction=coarse, seed=1)
     assert np.median(apart(measure_directions(level.image)[INNER], 0)) < 8
@@ -92,7 +92,7 @@ def test_on_a_plane_it_turns_there():
         flat[name] = fold @ frames
     c, s = np.cos(np.radians(30)), np.sin(np.radians(30))
     np.testing.assert_allclose(flat["turned"], np.array([[c, s], [-s, c]]) @ flat["straight"], atol=0.04)
-    # The same holds with a scale map as target, which keeps the plane's own foreshortening.
+    # Directions also work with a scale map as target, which keeps the plane's own foreshortening.
     plain = texrs.perspective(floor, own, SIDE, direction=30.0, seed=1)
     assert plain.report["sheet"]["kind"] == "plane"
     assert plain.report["scale_error"] < 0.1

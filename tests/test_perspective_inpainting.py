@@ -50,7 +50,7 @@ def test_elements_in_the_hole_grow_as_those_around_it(floor, method):
     def agreement(picture):
         return np.corrcoef(np.log(checks.wavelength(picture)[inside]), np.log(scale[inside]))[0, 1]
 
-    # A few elements fill the hole, so one result shows little.
+    # Only a few elements fill the hole, so average several results.
     found = [agreement(fill(image, hole, seed=seed, scale_map=known, method=method).image) for seed in range(6)]
     assert np.mean(found) >= 0.95 * agreement(image), found
 
@@ -82,7 +82,7 @@ def test_a_scale_map_that_is_measured(floor, method):
 def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, method):
     image, scale = floor
     hole = hole_in(image.shape[:2], (40, 110, 45, 115))
-    # Another floor of the same kind, where the other end is large.
+    # Copy from another floor of the same kind, whose elements are large at the other end.
     other, theirs = (np.ascontiguousarray(a[::-1]) for a in checks.floor((170, 190), seed=3))
     result = fill(image, hole, method=method, exemplar=other, scale_map=scale, exemplar_scale_map=theirs)
     np.testing.assert_array_equal(result.image[~hole], image[~hole])

@@ -36,7 +36,7 @@ def test_a_plane_s_jacobians_are_the_derivatives():
     step = 1e-5
     by = [(plane.flatten(grid + step * e) - plane.flatten(grid - step * e)) / (2 * step) for e in EYE]
     np.testing.assert_allclose(plane.jacobians(), np.stack(by, axis=-1), rtol=1e-6, atol=1e-7)
-    # They are also the inverses of those of `project`.
+    # These Jacobians are also the inverses of the Jacobians of `project`.
     np.testing.assert_allclose(
         plane.projection_jacobians(plane.flatten(grid)) @ plane.jacobians(),
         np.broadcast_to(EYE, (40, 56, 2, 2)),
@@ -47,7 +47,7 @@ def test_a_plane_s_jacobians_are_the_derivatives():
 @pytest.mark.parametrize("turned", [0, 30, 90, 140])
 def test_a_cylinder_is_unrolled_by_its_normals(turned):
     found = scale_maps.jacobians_of_normals(make_column(turned=turned))
-    # Unroll it: the arc, along the direction in which it curves away.
+    # Unroll the cylinder: one coordinate is the arc length in the direction of curvature.
     y, x = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) / 2
     angle, radius = np.radians(turned), SIDE / 2 / 0.9
     u, v = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
@@ -132,7 +132,7 @@ def test_frames_are_those_of_the_surface(around):
     assert around.report["sheet"]["kind"] == "front"
     frames = around.source_map.jacobians()
     np.testing.assert_allclose(frames, scale_maps.jacobians_of_normals(make_column()), atol=0.01)
-    # The coordinates follow them, except at seams.
+    # Steps of the coordinates follow the frames, except at seams.
     labels, made = around.source_map.label, derive(around.source_map.coordinates.astype(float))
     inside = np.ones(labels.shape, bool)
     for axis in (0, 1):
@@ -163,7 +163,7 @@ def test_normal_maps_of_the_texture_turn_with_it(weave, around):
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     shown = around.source_map.render(normal.astype(np.float32), map_type="normal", interpolation="linear")
     plain = around.source_map.render(normal.astype(np.float32), interpolation="linear")
-    # A compressed bump is steeper by the cosine across the axis.
+    # Bumps are compressed across the axis, so their slopes are divided by the cosine.
     cos = make_column()[..., 2]
     np.testing.assert_allclose(
         (shown[..., 0] / shown[..., 2]), (plain[..., 0] / plain[..., 2]) / cos, atol=0.02, rtol=0.02
@@ -187,7 +187,7 @@ def test_one_floor_laid_on_another():
     assert made.image.shape == (96, 120, 3)
     assert made.report["sheet"]["kind"] == "plane"
     assert made.report["scale_error"] < 0.05
-    # From one texture to the other, the frames without the exemplar's plane equal the target.
+    # Without the exemplar's own plane, the frames equal the target.
     at, frames = made.source_map.coordinates.astype(float), made.source_map.jacobians().astype(float)
     flat = Plane((128, 128), own.slant, own.tilt, own.fov)
     away = at - flat.principal_point
@@ -233,7 +233,7 @@ def test_what_is_no_plane_and_has_many_sizes_is_bent_in_copies():
     assert made.report["scale_error"] < 0.15
     whole = np.abs(np.linalg.det(made.source_map.jacobians()))
     wanted = np.abs(np.linalg.det(scale_maps.jacobians_of_normals(make_column())))
-    # If copies have scales other than 1, the frames shrink or enlarge them by the size of their elements.
+    # Copies from places with other scales are enlarged or shrunk by the scale there.
     sizes = scale[tuple(np.rint(made.source_map.coordinates).astype(int).reshape(-1, 2).T)].reshape(whole.shape)
     assert np.median(np.abs(np.log(whole / wanted / sizes**2))) < 0.25
 

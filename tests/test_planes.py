@@ -26,7 +26,7 @@ def test_there_and_back(plane: Plane) -> None:
     step = 1e-5
     slopes = [(plane.project(there + step * way) - plane.project(there - step * way)) / (2 * step) for way in np.eye(2)]
     np.testing.assert_allclose(plane.projection_jacobians(there), np.stack(slopes, axis=-1), atol=1e-6)
-    # Areas follow the frames: they are the power 3/2 of widths.
+    # Areas follow from the frames, and their square roots are the power 3/2 of widths.
     areas = np.sqrt(np.abs(np.linalg.det(plane.projection_jacobians(there))))
     np.testing.assert_allclose(areas / plane.width(points) ** 1.5, np.cos(np.radians(plane.slant)) ** 0.5)
 
@@ -119,7 +119,7 @@ def test_lines_lean_towards_their_horizon() -> None:
     side, rng = 320, np.random.default_rng(0)
     middles = rng.uniform(-120, 120, (400, 2))
     rise = np.array([0.4, -0.7])
-    # Three of four run in one of two directions of the plane, with an error.
+    # Three of four lines run in one of two directions of the plane, with an error.
     angles = np.where(rng.uniform(0, 1, 400) < 0.75, rng.choice([0.3, 1.6], 400), rng.uniform(0, np.pi, 400))
     way = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     seen = way + middles / side * (way @ rise)[:, np.newaxis]
@@ -138,7 +138,7 @@ def test_lines_lean_towards_their_horizon() -> None:
 def test_lines_of_a_board_are_found() -> None:
     board = np.kron(np.indices((6, 8)).sum(axis=0) % 2, np.ones((40, 40))).astype(np.float32)
     lines = find_lines(board, np.ones(board.shape, np.bool_))
-    # Each side of a square, along rows or columns, where two colours meet.
+    # A line is found for each side of a square where two colours meet.
     assert len(lines.lengths) >= 5 * 8 + 6 * 7
     assert np.abs(np.abs(lines.ways).max(axis=1) - 1).max() < 1e-3
     assert np.median(lines.lengths) == pytest.approx(40, abs=5)
@@ -162,12 +162,12 @@ def test_what_is_not_the_plane_does_not_count() -> None:
 
 
 def test_the_same_doubt_is_more_of_a_small_slant() -> None:
-    # This is about the tilt of a plane with little rise. With hardly any slant, the tilt does not count.
+    # The same error changes the tilt more if the rise is small. Without slant, the tilt does not count.
     steep, aslant, front = (trust(rise, 0.03, 0.06, 1.4) for rise in (0.6, 0.2, 0.001))
     assert aslant < 0.8 * steep
     assert aslant < front
-    # This also holds if bands differ, or something is off the plane. A longer lens gives a larger slant for the same
-    # rise.
+    # The confidence is also lower if bands differ, if measurements deviate from the plane, or with a longer lens,
+    # which gives a larger slant for the same rise.
     assert trust(0.6, 0.5, 0.06, 1.4) < 0.7 * steep
     assert trust(0.6, 0.03, 0.3, 1.4) < 0.5 * steep
     assert trust(0.3, 0.03, 0.06, 3.0) < trust(0.3, 0.03, 0.06, 1.0)
@@ -177,6 +177,6 @@ def test_confidence_says_what_to_believe() -> None:
     floor = look("weave", Plane((192, 224), 35, 90, fov=55))
     sure = planes.find(floor, fov=55)
     assert planes.find(floor, fov=55) == sure
-    # There are two planes in one image, and a wall.
+    # An image of two planes and a wall gives a lower confidence.
     torn = planes.find(look_twice(), fov=55)
     assert 0 <= torn.confidence < sure.confidence <= 1

@@ -32,7 +32,7 @@ def test_a_column_is_no_plane() -> None:
     found = planes.measure_scale(picture)
     assert found.shape == "curved"
     assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
-    # A pattern that continues along it has the same size everywhere.
+    # Along the axis of the column, the pattern has the same size everywhere.
     assert np.log(found.scale).mean(axis=1).std() < 0.03
 
 

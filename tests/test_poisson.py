@@ -90,7 +90,7 @@ def test_a_solution_can_be_stopped(masked):
         assert 0 <= share <= 1
         raise KeyboardInterrupt
 
-    # A single thread asks several times before it is done.
+    # The image is so large that even a single thread checks for cancellation several times.
     flow = np.zeros((4000 if masked else 12000, 1021, 3), np.float32)
     flow[::7, ::5] = 1
     mask = None if mask is None else np.random.default_rng(9).random(flow.shape[:2]) < 0.9

@@ -117,7 +117,7 @@ def stop(*place: object) -> None:
 
 
 def test_a_kernel_without_progress_is_stopped_by_who_watches_the_call_around_it():
-    # This would take minutes.
+    # The complete filter would take minutes.
     noise = np.random.default_rng(0).random((512, 512, 3)).astype(np.float32)
     with answering(stop, "stage", 0.0), pytest.raises(Stop):
         texrs.kernels.mean_shift.mean_shift(noise, 200, 0.5)

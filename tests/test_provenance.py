@@ -111,7 +111,7 @@ def test_commands_replace_what_they_made(here: Path, capsys: Capture, name: str)
     assert said(target)["verb"] == name.split()[0]
     assert main([*command, "--threads", "1"]) == 0
     assert Path(target).read_bytes() == first
-    # A file that was changed since belongs to the user.
+    # A file that was changed afterwards belongs to the user.
     if target.endswith(".png"):
         picture = io.read(target)
         io.write(target, picture[::-1].copy())
@@ -301,7 +301,7 @@ def test_every_format_says_what_it_holds_and_is_made_again(here: Path, capsys: C
     if allowed.images:
         dtype = np.float32 if np.dtype(np.float32) in allowed.dtypes else np.uint8
         image = io.read("in.png")
-        # GIF stores few colours.
+        # Reduce the colours for GIF, which stores at most 256.
         image = image // 64 * 64 if suffix == ".gif" else image
         io.write("in.npy", image if dtype == np.uint8 else image.astype(dtype) / 255)
         made.append(("image", f"tile in.npy -o image{suffix} --wrap x", "3 channels"))

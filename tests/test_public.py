@@ -39,7 +39,7 @@ def test_dir_shows_public_names_alone(module: ModuleType) -> None:
 @pytest.mark.parametrize("name", [n for n in texrs.__all__ if not n.startswith("_")])
 def test_public_names_are_documented(name: str) -> None:
     text = getattr(texrs, name).__doc__
-    # The generated docstring of a dataclass is its signature.
+    # Refuse the generated docstring of a dataclass, which is its signature.
     assert text
     assert not text.startswith(f"{name}(")
 
@@ -80,7 +80,7 @@ def public_entries() -> dict[str, Any]:
 
 
 def list_parameters(value: Any) -> list[inspect.Parameter]:
-    # The signature of an enumeration is the signature of its root.
+    # Skip enumerations, because their signature is the signature of their base class.
     if inspect.isclass(value) and issubclass(value, enum.Enum):
         return []
     own = inspect.signature(value).parameters.values()

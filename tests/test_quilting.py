@@ -52,7 +52,7 @@ def test_spans_cover_an_axis(length: int, side: int, part: float, share: float, 
         assert 0 < span.extent <= side
         places = span.start + np.arange(span.extent)
         assert wrap or places[-1] < length
-        # The stated overlap at its beginning is covered already, and nothing else behind it.
+        # Earlier patches cover the stated overlap at the beginning of this span, and nothing behind it.
         inside = covered[places % length] > 0
         expected = np.zeros(span.extent, bool)
         expected[: span.before] = True
@@ -90,7 +90,7 @@ def test_no_mirror_image_lies_beside_its_original(pebbles: np.ndarray) -> None:
             turned = hands != np.roll(hands, -1, axis)
             apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)
             met, edges = met + int((apart[turned] <= 2).sum()), edges + int(turned.sum())
-    # If nothing is refused, it is 1/7.
+    # Without the rejection of mirrored patches, the share would be 1/7.
     assert met < 0.08 * edges
 
 
@@ -193,7 +193,7 @@ def test_patches_of_a_wave_lie_apart(
         near = np.zeros((height, width), int)
         for window in wave:
             near[reference.surround(window, (height, width), wrap)[0]] += 1
-            # All stated overlaps above and before it exist already.
+            # The stated overlaps with patches above and before the window are already covered.
             at, known = reference.index(window, (height, width)), reference.mark_known(window)
             if window.rows.after == 0:
                 assert covered[at][known].all()
@@ -211,7 +211,7 @@ def test_waves_are_the_same_for_any_number_of_threads(monkeypatch: pytest.Monkey
             sources.append(made([picture(pebbles)], **asked))
     assert all((s.coordinates == sources[0].coordinates).all() for s in sources[1:])
     assert all((s.label == sources[0].label).all() for s in sources[1:])
-    # In another order, it is as good a texture.
+    # Another order of patches gives another texture of the same quality.
     monkeypatch.undo()
     row = made([picture(pebbles)], **asked)
     assert (row.coordinates != sources[0].coordinates).any()

@@ -45,7 +45,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = str(folder / "pictures")
     assert main(["samples", *planar, "-o", out, "--size", "128", "-q"]) == 0
     assert main(["samples", *solid, *samples.photographs(), "-o", out, "-q"]) == 0
-    # Files that readers make: a mask for each name in the guides, and the maps of a material.
+    # Create the files that readers make themselves: a mask for each name in the guides, and the maps of a material.
     hole = np.zeros((128, 128), np.uint8)
     hole[48:80, 44:70] = 255
     ground = np.full((128, 128), 255, np.uint8)

@@ -65,7 +65,7 @@ def test_normals_turn_with_the_plane() -> None:
         source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, rotation=turn)).source_map
         found = texrs.apply(source, right, map_type="normal") / 127.5 - 1
         np.testing.assert_allclose(found.reshape(-1, 3).mean(axis=0), (*leans, 0.8), atol=0.02)
-        # Heights are numbers, and only move.
+        # Heights are plain numbers, so they only move.
         np.testing.assert_array_equal(texrs.apply(source, right[..., 0]), right[0, 0, 0])
 
 

@@ -48,7 +48,7 @@ def test_regions_are_those_of_scikit_image(name, smooth):
 
     image = PICTURES[name]()
     unit = image / np.float32(255) if image.dtype.kind == "u" else image.astype(np.float32)
-    # No two colours are equal, as in a photograph, because scikit-image orders equal steps arbitrarily.
+    # Add noise so that no two colours are equal, because scikit-image orders equal steps arbitrarily.
     unit = np.float32(unit + np.random.default_rng(1).normal(0, 0.01, unit.shape))
     if smooth:
         unit = mean_shift(unit, 6, 0.05)

@@ -46,7 +46,7 @@ def test_ground_is_told_from_sky_and_things(name: str) -> None:
     picture, ground, marked = see(name, sky=True, thing=True)
     found, there = planes.find_ground(picture), ground & ~marked
     assert (found & there).sum() / (found | there).sum() >= 0.9
-    # Unknown pixels are in neither.
+    # Unknown pixels do not belong to the ground.
     known = planes.find_ground(picture, known=~marked)
     assert not known[marked].any()
     assert (known & there).sum() / (known | there).sum() >= 0.9
@@ -66,7 +66,7 @@ def test_a_wall_is_no_ground_where_one_slow_change_follows_both(name: str, above
     picture, ground = dress(look(name, plane), plane.tilt, above=above, seed=1)
     found = planes.find_ground(picture)
     assert (found & ground).sum() / (found | ground).sum() >= 0.9
-    # The border of a shadow is also a step.
+    # The border of a shadow is also a step of brightness, but does not end the ground.
     shadow = np.where(ground[..., np.newaxis], 1.0, 0.8) * look(name, plane)
     assert planes.find_ground(shadow.astype(np.uint8)).mean() > 0.97
 
@@ -114,7 +114,7 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     wide = made.stages["known"] != picture
     assert wide.any(axis=2)[marked].all()
     np.testing.assert_array_equal(made.image[~wide.any(axis=2)], picture[~wide.any(axis=2)])
-    # Sky is blue, beans are not, and the object leaves no trace.
+    # Filled pixels are not blue, so they are not copied from the sky.
     filled = made.image[marked].astype(float)
     assert (filled[:, 2] < filled[:, 0] + 30).mean() > 0.99
     rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
@@ -130,7 +130,7 @@ def test_a_shadow_that_is_left_does_not_go_on() -> None:
     made = texrs.remove(picture, marked, view=PlaneView(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
     rows, columns = np.rint(made.source_map.coordinates[marked]).astype(int).T
     assert not shadow[rows, columns].any()
-    # The sky does not either, except next to a hole in the sky.
+    # Patches are not copied from the sky either, except into a hole in the sky.
     assert ground[rows, columns].all()
     aloft = np.zeros(SIZE, bool)
     aloft[20:35, 60:90] = True
@@ -147,13 +147,13 @@ def test_each_of_several_planes_is_filled_from_its_own() -> None:
     made = texrs.remove(np.where(marked[..., np.newaxis], np.uint8(9), picture), marked, view=views, seed=1)
     changed = made.source_map.label > 0
     rows, columns = np.rint(made.source_map.coordinates[changed]).astype(int).T
-    # They meet in the line that continues their border.
+    # The two planes meet in the line that continues their border.
     assert (low[rows, columns] == low[changed]).mean() > 0.97
     assert not marked[rows, columns].any()
     assert [each["plane"]["slant"] for each in made.report["planes"]] == [50, 35]
     assert min(made.report["patches"]) > 0
     np.testing.assert_array_equal(made.image[~changed], picture[~changed])
-    # Neither stains the other: bricks are red, pebbles are not.
+    # The colours of the planes do not mix: bricks are red, pebbles are not.
     red = made.image[..., 0] - made.image[..., 2].astype(float)
     assert np.median(red[changed & ~low]) > 40 > 25 > np.median(red[changed & low])
 
@@ -163,13 +163,13 @@ def test_parts_meet_in_a_hole_in_their_line(slope: float) -> None:
     rows, columns = np.indices((90, 120))
     low = rows - 45 > slope * (columns - 60)
     hole = np.zeros(low.shape, bool)
-    # It is nearer to the first one.
+    # The hole is nearer to the first part.
     hole[20:52, 40:85] = True
     everywhere = np.ones_like(hole)
     owner = share_out(hole, [low & ~hole, ~low & ~hole], [everywhere, everywhere])
     assert (owner[hole] == ~low[hole]).mean() > 0.98
     assert (owner[~hole] == -1).all()
-    # Parts that cannot continue there do not.
+    # A part that cannot reach the hole does not continue there.
     assert (share_out(hole, [low & ~hole, ~low & ~hole], [~everywhere, everywhere])[hole] == 1).all()
 
 

@@ -73,7 +73,7 @@ def test_associated_alpha(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
         "float.tif", multiplied / np.float32(255), photometric="rgb", extrasamples=["assocalpha"], planarconfig="contig"
     )
     assert np.abs(texrs.io.read("float.tif") * 255 - straight).max() <= 1
-    # Decoders other than tifffile: the compiled one, and Pillow, which divides the colours itself.
+    # Test the decoders other than tifffile: the compiled one, and Pillow, which divides the colours itself.
     for scheme in ("tiff_lzw", "zstd"):
         Image.fromarray(multiplied).save("coded.tif", compression=scheme)
         data, kind = Path("coded.tif").read_bytes(), b"\x52\x01\x03\x00\x01\x00\x00\x00"
@@ -95,7 +95,7 @@ def test_colours_of_transparent_pixels(here: Path) -> None:
     assert main(["tile", "clear.png", "-o", "tiled.png", "-q"]) == 0
     assert (read("tiled.png")[..., 3] == 0).any()
     assert list_pixels(read("tiled.png")) <= list_pixels(clear)
-    # Seams of a design are corrected below an alpha of 0 too.
+    # Seams of a design are also corrected in transparent pixels.
     assert main(["design", "clear.png", "-o", "made.png", "--size", "96", "-q"]) == 0
     made = read("made.png")
     below, given = made[made[..., 3] == 0, :3], clear[20:60, 20:60, :3].reshape(-1, 3)

@@ -73,7 +73,7 @@ def test_shapes_and_types(name: str) -> None:
     if sample.jacobians is not None:
         assert sample.jacobians.dtype == np.float32
         assert sample.jacobians.shape == (*shape, axes, axes)
-    # The image uses its range, and neither end much.
+    # The image uses most of its range, but few pixels are black or white.
     assert 40 < sample.image.mean() < 190
     assert sample.image.std() > 12
     assert (sample.image == 255).mean() < 0.02
@@ -219,7 +219,7 @@ def test_labels_go_on_across_the_border(name: str) -> None:
     sample = torus(name)
     assert sample.labels is not None
     assert sample.centres is not None
-    # On the torus every element is whole. Rolled to the middle, its centroid is there.
+    # On the torus every element is whole, so its centroid can be measured after rolling it to the middle.
     for i, centre in enumerate(sample.centres):
         at = np.argwhere(sample.labels == i + 1)
         box = np.array(sample.labels.shape)

@@ -76,7 +76,7 @@ def test_planes_are_told_of_either_kind():
     for scale in (wide, wide.as_kind("area")):
         found = Plane.of_scale_map(scale)
         assert (found.slant, found.tilt) == pytest.approx((40, 70), abs=0.1)
-    # A map of areas is not taken for one of widths, however well it would fit.
+    # A map of areas is not treated as a map of widths, even if it would fit well.
     image = texrs.Exemplar(samples.tilted_discs((128, 128)).image).guidance
     straight = scale_maps.from_angles((128, 128), 50, 90)
     assert find_plane(image, straight).power == 1
@@ -123,7 +123,7 @@ def test_files_keep_the_kind(tmp_path, monkeypatch, capsys, name):
         assert ("widths" if kind == "width" else "roots of areas") in said
         assert ("--fov" in said) == (way == "--slant 40")
         assert io.read_description(name) == f"scale map: {kind}"
-        # This also holds for maps computed from it.
+        # A map that is computed from this file has the same kind.
         assert main(["scale-map", "floor.png", "-o", "two.tif", "--scale-map", name, "--size", "32", "-q"]) == 0
         assert io.read_description("two.tif") == f"scale map: {kind}"
     assert main(["perspective", "floor.png", "-o", "out.png", "--scale-map", name, "--size", "32", "-q"]) == 0
@@ -139,7 +139,7 @@ def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
     plane = texrs.planes.find(floor.image)
     wide, areas = plane.scale_map(), plane.scale_map("area")
     by_widths = texrs.inpaint(floor.image, hole, scale_map=wide)
-    # Arrays do not specify their contents.
+    # Plain arrays do not record their kind, so pass it.
     one, other = np.array(wide), np.array(areas)
     said = texrs.inpaint(floor.image, hole, scale_map=one, scale_kind="width")
     np.testing.assert_array_equal(said.image, by_widths.image)

@@ -43,7 +43,7 @@ def test_the_root_of_the_area_and_the_width_are_measured_in_a_clean_mask() -> No
     assert min(area.correlation, width.correlation) >= 0.99
     assert area.slope == pytest.approx(1.5, abs=0.15)
     assert width.slope == pytest.approx(1, abs=0.1)
-    # It equals the map by angles, then.
+    # With the conversion to widths, the measured map equals the map from the angles.
     by_angles = scale_maps.from_angles((SIDE, SIDE), TILES.slant, TILES.tilt, fov=TILES.fov)
     measured = scale_maps.from_mask(TILES.mask, trend="plane", foreshortened=True)
     off = np.log(measured / by_angles)
@@ -57,7 +57,7 @@ def test_bricks_are_measured_in_their_mask() -> None:
 
 def test_sizes_that_change_without_perspective_are_measured_as_they_are() -> None:
     rows, columns = np.indices((300, 300)) / 300
-    # A lattice of discs, twice as dense at the right as at the left: S = 2^(-x), so log S is linear.
+    # Draw a lattice of discs, twice as dense at the right as at the left: S = 2^(-x), so log S is linear.
     u, v = (2**columns - 1) / np.log(2) * 30, rows * 30
     size = 2.0**-columns
     mask = (np.sin(2 * np.pi * u) > 0) & (np.abs(v - np.rint(v)) < 5)
@@ -71,7 +71,7 @@ def test_the_paper_s_count_of_areas_measures_nothing() -> None:
     """Equation 1 counts pixels of the mask. The share of areas does not depend on their size."""
     for mask in (TILES.mask, ~TILES.mask):
         assert abs(checks.by_mask(TILES, mask, measure="area").correlation) < 0.5
-    # For curves it is inverted: large ones become small.
+    # For curves, the measured scales are reciprocal: large elements become small.
     rows = np.cumsum(np.linspace(6, 24, 40)).astype(int)
     curves = np.zeros((rows[-1] + 12, 200), bool)
     curves[rows] = True
@@ -162,7 +162,7 @@ def test_outlines_are_counted_once_and_for_both_sides() -> None:
     assert (_count_outlines(mask, None) == _count_outlines(~mask, None)).all()
     known = np.ones_like(mask)
     known[:, 9:] = False
-    # These are the right side, and the unknown parts of the two long ones.
+    # Count the left side, and the known parts of the two long sides.
     assert _count_outlines(mask, known).sum() == 4 + 2 * 7
 
 
@@ -175,7 +175,7 @@ def test_features_are_counted_at_their_middles_and_cut_ones_by_half() -> None:
     known = np.ones_like(mask)
     known[10:13, 25:] = False
     assert _mark_middles(mask, known)[11, 22] == 1
-    # A ring and the element in its middle are two.
+    # A ring and the disc in its middle are two features with the same centre.
     rows, columns = np.indices((41, 41)) - 20
     ring = (np.hypot(rows, columns) > 8) & (np.hypot(rows, columns) < 11) | (np.hypot(rows, columns) < 3)
     assert _mark_middles(ring, None)[20, 20] == 4

@@ -45,7 +45,7 @@ def test_elements_are_the_elements_that_were_drawn(name, share):
     found = segment(sample.image)
     assert (found.kind, found.reason) == ("components", "")
     assert matched(found.elements, sample.labels) >= share * sample.labels.max()
-    # Nothing is found twice: most are one element, or a few that could not be separated.
+    # No element is found twice. A found element is usually one true element, or several that could not be separated.
     assert found.count <= 1.1 * sample.labels.max()
 
 
@@ -78,7 +78,7 @@ def test_the_lit_part_of_a_thing_stands_for_it():
     crescent = (far < 20) & (np.hypot(rows - 26, columns - 24) > 16)
     elements = crescent.astype(np.int32)
     assert fill_crescents(elements).sum() > 1.3 * crescent.sum()
-    # The background does not cover another element.
+    # A filled crescent does not cover another element.
     elements[20:24, 20:24] = 2
     assert (fill_crescents(elements) == elements).all()
 
@@ -116,7 +116,7 @@ def test_nonsense_takes_the_grid_and_says_why(image):
     found = segment(image)
     assert found.kind == "grid"
     assert found.reason
-    # The requested method is used.
+    # The requested method is used, even for a grid.
     assert segment(image, ElementOptions(segmentation="components")).kind == "components"
 
 
@@ -271,7 +271,7 @@ def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
     picture = unit(drawn(name).image)
     found = measure_polarity(picture)
     assert all(found[axis] > 10 for axis in axes)
-    # Lit from the other side, the difference is the same.
+    # An image that is lit from the other side has the same difference.
     assert np.allclose(measure_polarity(picture[::-1]), found, rtol=0.05)
     assert np.allclose(measure_polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
 

@@ -54,7 +54,7 @@ def test_what_is_seen_along_a_ramp_fits_together_and_stands_as_it_stood():
     turned = scale_maps.from_angles((40, 50), 50, 80)
     other = Slope.fit(turned)
     frames = plane.jacobians(turned, other)
-    # They are derivatives of one map, so mixed derivatives agree.
+    # The frames are derivatives of one map, so mixed derivatives agree.
     curl = np.gradient(frames[..., 1], axis=0) - np.gradient(frames[..., 0], axis=1)
     assert np.abs(curl[2:-2, 2:-2]).max() < 0.02 * np.abs(frames).max()
     np.testing.assert_allclose(frames[20, 25] @ plane.down, plane.jacobians(turned)[20, 25] @ plane.down, atol=0.15)
@@ -76,11 +76,11 @@ def test_a_map_that_hardly_varies_is_no_plane():
 def test_round_things_that_get_smaller_are_no_plane(disc_floor):
     image, scale = disc_floor
     assert find_plane(texrs.Exemplar(image).guidance, scale) is not None
-    # From areas the plane is the same.
+    # A map of areas gives the same plane.
     areas = find_plane(texrs.Exemplar(image).guidance, scale**1.5)
     assert areas.power == pytest.approx(2 / 3)
     assert areas.slope == pytest.approx(find_plane(texrs.Exemplar(image).guidance, scale).slope, rel=1e-3)
-    # A measured map varies, but edges give evidence.
+    # A measured map varies, but edges of the image support the plane.
     rough = scale * np.exp(0.05 * np.sin(np.arange(128) / 3))[:, np.newaxis].astype(np.float32)
     assert Slope.fit(rough).residual > 0.03
     assert find_plane(texrs.Exemplar(image).guidance, rough) is not None
@@ -116,14 +116,14 @@ def test_copies_have_the_elements_of_the_exemplar():
             sheet.elements.labels.ravel(), np.arange(sheet.free.size).reshape(sheet.free.shape)[copy.window]
         )
         assert not np.intersect1d(labels[labels > 0], others).size
-        # The number and area of elements agree with their source, relative to the larger size and depth.
+        # A rescaled copy has the same share of elements as its source, and their depth is rescaled.
         assert len(np.unique(labels)) > 20
         size = float(np.sqrt(np.prod(copy.factor)))
         ends = [slice(f, f + round(n / k)) for f, n, k in zip(copy.first, copy.shape, copy.factor, strict=True)]
         there = sheet.elements.depth[first.window][tuple(ends)]
         assert (depth > 0).mean() == pytest.approx((there > 0).mean(), rel=0.1)
         assert depth.max() == pytest.approx(size * there.max(), rel=0.1)
-    # All numbers are used.
+    # All numbers of elements occur.
     assert np.array_equal(np.unique(sheet.elements.labels), np.arange(sheet.elements.count + 1))
     assert (sheet.elements.labels[~sheet.free] == 0).all()
 
@@ -174,7 +174,7 @@ def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     at = np.rint(result.source_map.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
-    # In depth, copies are rotated and scaled. Copies of squares are neither.
+    # On an oblique plane, copies are projected, so their frames differ from the identity.
     assert np.abs(result.source_map.jacobians()[hole] - np.eye(2)).max() > 0.05
     with texrs.threads(1):
         alone = texrs.inpaint(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))

@@ -69,7 +69,7 @@ def make_words(command: str, name: str, text: str) -> list[str]:
     if place is not None:
         return [command, *words[:place], text, *words[place + 1 :]]
     flag = max(next(p.opts for c, p in PARAMETERS if c == command and p.name == name), key=len)
-    # The other inputs are materials too, so that all fit.
+    # Use materials for the other inputs as well, so that all inputs fit each other.
     return [command, *(text if word == "in.png" else word for word in words), f"{flag}={text}"]
 
 
@@ -95,7 +95,7 @@ def test_unused_files_are_reported(here: Path, capsys: Capture, command: str, na
         err = capsys.readouterr().err
         assert unused in err, err
         assert "--strict" in err
-        # For batches, the reader of the job finds it.
+        # In a batch, a job finds the unused preview, so the exit code is 3.
         assert code == (3 if command == "batch" and unused.startswith("preview") else 2)
         assert sorted(here.rglob("*")) == before or command == "batch"
         main(make_words(command, name, folder))

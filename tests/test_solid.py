@@ -218,7 +218,7 @@ def test_exemplars_that_repeat_are_found_by_measurement():
     assert around.report["periodic_axes"] == [True, True, True]
     bounded = texrs.solid(texrs.Exemplar(whole, axes=3, repeat=False), 40, seed=4)
     assert bounded.report["periodic_axes"] == [False, False, False]
-    # If it is periodic, patches continue across its end, so all of it can be used.
+    # In a periodic exemplar, patches continue across its ends, so all of it can be used.
     across = [
         sum(
             (

@@ -98,7 +98,7 @@ def test_turned_exemplars_are_what_the_frame_says():
     field = fields.rotation(90, "xz")
     volume = np.random.default_rng(0).random((4, 5, 6))
     turned = checks.turned_exemplar(volume, field.constant)
-    # A step of the exemplar is the frame's step of the output.
+    # A step in the exemplar becomes, in the rotated exemplar, the product of the frame and the step.
     p = np.array([1, 2, 2])
     first = np.argwhere(turned == volume[tuple(p)])[0]
     for axis in range(3):
@@ -191,16 +191,16 @@ def test_cheats_fail():
     noise = shown(np.random.default_rng(0).integers(0, 64, grid.shape), stripes)
     assert "coherent" in checks.s5(noise).failed
     assert not checks.s2(stripes, noise).passed
-    # Only the coordinates are rotated, not the pixels between them.
+    # The unchanged exemplar does not follow a zigzag field.
     assert "median" in checks.s1(stripes, stripes, FIELDS["zigzag"]).failed
     # A field that leaves the layers unchanged gives no evidence.
     assert "turned" in checks.s1(stripes, stripes, fields.rotation(30, "xy")).failed
-    # Blocks are side by side.
+    # Blocks that are put side by side have visible planes between them.
     cells = (
         np.random.default_rng(1).integers(0, 40, (3, 3, 3, 3)).repeat(24, 0).repeat(24, 1).repeat(24, 2)[:64, :64, :64]
     )
     assert "planes" in checks.s6(stripes, shown(cells + grid % 24, stripes).image).failed
-    # A texture may change at planes of its own, at any of them, if it does so everywhere.
+    # A texture with visible planes of its own passes, because the exemplar has the same planes.
     woven = np.random.default_rng(2).integers(0, 256, (16, 16, 16, 3), dtype=np.uint8)
     woven[-1] = 255 - woven[0]
     assert "planes" not in checks.s6(np.tile(woven, (4, 4, 4, 1)), np.tile(woven, (5, 5, 5, 1))).failed

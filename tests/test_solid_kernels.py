@@ -141,7 +141,7 @@ def test_kernels_report_and_stop():
     def stop(share):
         raise KeyError("enough")
 
-    # Work before the first report, 0.05 s after the start, cannot be stopped.
+    # Use a large region, because work cannot be stopped before its first report after 0.05 s.
     long = Region.whole((64, 64, 64))
     with pytest.raises((Cancelled, KeyError)):
         appearance.blocks(long, to_fixed(None, long), progress=stop)

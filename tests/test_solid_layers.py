@@ -206,7 +206,7 @@ def test_the_ground_covers_the_world_with_the_exemplar(field: str, repeat: bool)
     if not repeat:
         assert (places.reshape(-1, 2) >= 0).all()
         assert (places.reshape(-1, 2) <= [39 * ONE, 29 * ONE]).all()
-    # A box is one map of one frame.
+    # Each box has a single frame, so the boxes of a varying field have different frames.
     frames = to_fixed(known, here)
     assert len(table) >= 12
     assert frames.shape[0] == 1 or len(np.unique(table[:, 4:8], axis=0)) > 1
@@ -216,7 +216,7 @@ def test_boxes_end_at_folds() -> None:
     field = fields.zigzag(24, 35)
     here = Region((40, 30, 32), (-3, 5, 0), (False,) * 3)
     _, boxes, table = Ground((64,) * 3, (True,) * 3, 32, 7, field).show(here)
-    # Each shows only one band of the field, from end to end.
+    # Each box shows only one band of the field, from end to end, so its frame is exact.
     assert np.array_equal(table[boxes, 6:15].reshape(-1, 3, 3), to_fixed(field, here))
     tiles = 3 * 2 * 1
     assert len(table) <= tiles * (32 // 12 + 2)

@@ -142,7 +142,7 @@ def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
 
 
 def test_most_of_which_compensation_cures(stripes):
-    """Neighbours are read in the diagonal direction, not where the lattice ends it. The paper omits this."""
+    """Compensated windows allow for the offset of the lattice (Lefebvre and Hoppe 2006), which the paper omits."""
     field = fields.rotation_3d()
     normal = volume.texture_normal(volume.lightness(stripes))
     off = []

@@ -66,7 +66,7 @@ def test_reuse_counts_pieces():
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 def test_normals_turn_with_the_frame(dtype):
-    # A plane that falls to the right: x of the normal is positive. Rotated by 90 degrees it falls up or down.
+    # Use a plane that falls to the right, so x of the normal is positive. Rotated by 90 degrees, it falls up or down.
     normal = np.zeros((21, 21, 3))
     normal[...] = np.array([0.6, 0.0, 0.8])
     encoded = normal if dtype == np.float32 else np.rint((normal + 1) / 2 * np.iinfo(dtype).max)
@@ -181,7 +181,7 @@ def test_directions_of_volumes_turn_in_space(green):
     given = rng.normal(size=3)
     own = given[::-1] * [1, side, 1]  # (plane, row, column)
     exemplar = np.tile(given, (1, 1, 5, 1))
-    exemplar[0, 0, 1:, 0] = -9  # Values are not encoded, whatever the first one is.
+    exemplar[0, 0, 1:, 0] = -9  # Negative values show that vectors are not encoded.
     for kind, wanted in (
         ("slope", np.einsum("nji,j->ni", frames, own)),
         ("normal", np.einsum("nji,j->ni", frames, own)),

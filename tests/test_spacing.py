@@ -50,7 +50,7 @@ def measure(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at = np.argwhere(labels[box] == number) * step
         if len(at) < 12 or any(s.start == 0 or s.stop == n for s, n in zip(box, image.shape, strict=True)):
             continue
-        # A voxel has an extent.
+        # Add the variance of a voxel, because voxels have an extent.
         values, vectors = np.linalg.eigh(np.cov(at.T) + np.diag(step**2 / 12))
         axes.append(np.sqrt(5 * values))
         longest = vectors[:, -1]
@@ -71,7 +71,7 @@ def test_ellipsoids_keep_their_axes_in_millimetres(angle: int, wanted: tuple[flo
     np.testing.assert_allclose(after, before, rtol=0.1)
     np.testing.assert_allclose(np.abs(direction), np.abs(wanted), atol=0.15)
     assert turned.report["spacing"] == list(SPACING)
-    # Without a spacing the longest axis has as many voxels as before, which is more millimetres.
+    # Without a spacing, the rotated longest axis keeps its number of voxels, so it is longer in millimetres.
     stretched, _ = measure(texrs.solid(ELLIPSOIDS, (30, 56, 56), field=field).image)
     assert stretched[2] > 1.25 * before[2]
     # Phases keep their values.
@@ -131,7 +131,7 @@ def test_the_middle_and_the_length_are_those_of_the_output_in_space() -> None:
     assert "about (8, 7, 10.5)" in str(wound)
     ramp = fields.as_field("scale_ramp:axis=z", 3, (11, 21, 31), spacing=SPACING)
     assert "along z over 16" in str(ramp)
-    # An omitted length is a number of the smallest voxel sides.
+    # The default of an omitted length is a multiple of the smallest voxel side.
     assert "period 22.4 along x" in str(fields.as_field("zigzag", 3, (11, 21, 31), spacing=SPACING))
     assert "period 0.02" in str(fields.as_field("zigzag:period=0.02", 3, spacing=(0.005, 0.005, 0.005)))
     with pytest.raises(InvalidInput, match=r"period: must be at least 1.4 \(2 voxels\), got 1"):
@@ -149,7 +149,7 @@ def test_arrays_spread_over_voxels_and_turn_in_space() -> None:
 def test_constraints_lie_at_places_in_space(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out = str(tmp_path / "scan.nrrd"), str(tmp_path / "out.nrrd")
     io.write_volume(source, ELLIPSOIDS, spacing=SPACING)
-    # A mask and values with voxels of another size: cubes of 1.4 mm.
+    # Use a mask and values with voxels of another size, cubes of 1.4 mm.
     near = np.zeros((16, 12, 12), np.uint8)
     near[4:8, 3:6, 2:9] = 255
     for name, volume_ in (("mask", near), ("values", np.where(near, 200, 0).astype(np.uint8))):
@@ -172,7 +172,7 @@ def test_constraints_lie_at_places_in_space(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_statistics_are_those_of_space() -> None:
-    # Layers 8 mm apart, sampled every 2 mm along planes and every 1 mm along rows.
+    # Use layers 8 mm apart, sampled every 2 mm along planes and every 1 mm along rows.
     z, y, x = np.meshgrid(np.arange(40) * 2.0, np.arange(64) * 1.0, np.arange(24) * 1.0, indexing="ij")
     along = ((z // 4) % 2 == 0) | (x < 0)
     across = ((y // 4) % 2 == 0) | (x < 0)
@@ -186,7 +186,7 @@ def test_statistics_are_those_of_space() -> None:
     assert volume.autocorrelation(waves, 16, spacing=(2, 1, 1))[0, [8, 16]].round(2).tolist() == [-1, 1]
     pieces = volume.component_statistics(ELLIPSOIDS > 0, spacing=SPACING)
     assert pieces.median == pytest.approx(4 / 3 * np.pi * np.prod(SEMI), rel=0.1)
-    # Layers that are oblique in space.
+    # Use layers that are oblique in space.
     layers = np.sin((z + y) * np.pi / 6)
     normal = volume.texture_normal(layers, spacing=(2, 1, 1))
     np.testing.assert_allclose(normal, np.array([1, 1, 0]) / 2**0.5, atol=0.1)

@@ -21,7 +21,7 @@ def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("dots", "pebbles"):
         io.write(f"{name}.png", texrs.samples.load(name, size=(96, 96)).image)
-    # Known elements need not be found.
+    # Save the known elements, so that the command does not have to find them.
     for name, side in (("bricks", 160), ("pebbles", 96)):
         texrs.ElementAnalysis.of_sample(texrs.samples.load(name, size=(side, side))).save(f"{name}.npz")
 

@@ -68,7 +68,7 @@ def test_elements_bring_their_shadows() -> None:
     light = result.image[..., 0].astype(float)
     seen = []
     for found in [match["found"] for match in result.report["matches"]]:
-        # A part of the shadow that its disc does not cover.
+        # Look at a part of the shadow that the disc does not cover.
         row, column = np.rint(found).astype(int) + 10
         if (
             2 <= row < SIDE - 2
@@ -78,7 +78,7 @@ def test_elements_bring_their_shadows() -> None:
             seen.append(light[row - 1 : row + 2, column - 1 : column + 2].mean() < 255 * 0.35)
     assert len(seen) >= 5
     assert np.mean(seen) > 0.85
-    # They do not leave a shadow behind.
+    # Discs do not leave a shadow at their former places.
     far = find_ground(result)
     assert (light[far] < 255 * 0.3).mean() < 0.12
 
@@ -87,7 +87,7 @@ def test_elements_and_ground_are_in_one_light() -> None:
     mine = make_discs(light=0.8)
     plain, even = (texrs.splice(mine, LAYOUT, seed=1, screening=weight) for weight in (None, 0.01))
     np.testing.assert_array_equal(plain.source_map.coordinates, even.source_map.coordinates)
-    # The border of a disc's surroundings, where neighbours are not neighbours in the texture.
+    # Find the borders of the discs' surroundings: adjacent pixels that are not adjacent in the texture.
     apart = np.abs(np.diff(plain.source_map.coordinates, axis=1)).sum(axis=-1) != 1
     apart &= (plain.source_map.label[:, 1:] == 0) & (plain.source_map.label[:, :-1] == 0)
     rows, columns = np.indices(apart.shape)
@@ -104,7 +104,7 @@ def test_elements_and_ground_are_in_one_light() -> None:
 
 def test_without_ground_to_speak_of_it_is_warped_as_before() -> None:
     mine = make_discs()
-    # Squares of 40 with lines of one pixel between them.
+    # Use squares of 40 pixels with lines of one pixel between them, so that there is hardly any background.
     mask = np.ones_like(mine.mask)
     mask[::40] = mask[:, ::40] = False
     full = ElementAnalysis(mine.image, mine.points, mask, (39, 39), Layout.DISJOINT, mine.scores)
@@ -124,7 +124,7 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
         return np.asarray(texrs.splice(entry, LAYOUT, seed=seed).image)
 
     discs = make_discs(shadow=True)
-    # The same elements, in other colours.
+    # Use the same elements in other colours.
     other = replace(discs, image=255 - discs.image)
     fresh = [splice_anew(entry, seed) for entry in (discs, other) for seed in (1, 2)]
     for _ in range(2):

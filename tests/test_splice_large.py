@@ -123,6 +123,6 @@ def test_separate_elements_go_on_unmirrored_on_their_own_layout(name: str) -> No
         away, near = KDTree(found).query(seen)
         close = away < 3
         assert (which[near[close]] == which[close]).sum() < 0.2 * len(found)
-    # It is not its own neighbour either.
+    # An element is hardly ever its own neighbour either.
     near = KDTree(found).query(found, k=4)[1][:, 1:]
     assert (which[near] == which[:, np.newaxis]).mean() < 0.1

@@ -87,7 +87,7 @@ def test_what_was_removed_leaves_ground_alone() -> None:
     gone = split_foreground(mine).core == one + 1
     rows, columns = result.source_map.coordinates.astype(int)[gone].T
     assert not mine.mask[rows, columns].any()
-    # There is no ghost: it is as bright as the background around.
+    # The place of a removed disc is as bright as the background around it.
     around = binary_dilation(gone, iterations=8) & ~binary_dilation(gone, iterations=3)
     here, there = (float(result.image[where].mean()) for where in (gone, around))
     assert abs(here - there) < 3
@@ -115,7 +115,7 @@ def test_elements_that_come_in_are_whole(edit: dict[str, Any]) -> None:
     inner = np.setdiff1d(np.unique(label), np.append(border, 0)) - 1
     assert len(inner) > 20
     assert parts.whole[element[inner]].all()
-    # Their scraps are only at the border.
+    # Remains of cut elements are only at the border.
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert not (BUTTONS.mask[rows, columns] & (label == 0))[12:-12, 12:-12].any()
 

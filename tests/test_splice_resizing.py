@@ -30,8 +30,8 @@ def test_the_layout_goes_on(name: str) -> None:
     assert (result.report["edit"], result.stages["resized"] is result.image) == ([], True)
     points = np.array(result.report["elements"])
     assert spacing(points) == pytest.approx(spacing(mine.points), rel=0.2)
-    # The number of elements fits the area, and no margin is empty: an element is within a spacing of each side. Cut
-    # cells have their centres in the image, and only whole ones of other elements do.
+    # The number of elements fits the area, and no margin is empty: an element is within a spacing of each side. The
+    # centres of cut cells are in the image. For other elements, only the centres of whole ones are.
     count = len(mine.points) if mine.known is None else int(mine.known.max())
     share = len(points) / count / (LARGE[0] * LARGE[1] / 128**2)
     assert share == pytest.approx(1.0, abs=0.25)
@@ -86,7 +86,7 @@ def test_steps_are_done_in_the_larger_texture() -> None:
     row, column = points[inner].astype(int)
     assert plain.source_map.render(mine.mask, interpolation="nearest")[row, column]
     assert not result.source_map.render(mine.mask, interpolation="nearest")[row, column]
-    # Pixels far from it do not change.
+    # Pixels far from the removed element do not change.
     np.testing.assert_array_equal(result.image[:20, :20], plain.image[:20, :20])
     again = texrs.self_splice(mine, result.report["edit"], LARGE, seed=1)
     np.testing.assert_array_equal(again.image, result.image)

@@ -34,7 +34,7 @@ def test_elements_in_a_plain_background_are_found():
     there = (found.depth > 0) & PARTICLES.mask
     assert there.sum() > 0.75 * PARTICLES.mask.sum()
     assert abs(found.count - len(PARTICLES.centres)) <= 0.15 * len(PARTICLES.centres)
-    # Each particle has one number except for one or two samples, also across the ends.
+    # All samples of a particle have the same number except for one or two, also across the ends.
     for k in range(1, 11):
         inside = found.labels[(PARTICLES.labels == k) & (found.labels > 0)]
         assert inside.size == 0 or np.bincount(inside).max() > 0.95 * inside.size
@@ -118,7 +118,7 @@ def test_the_frames_of_rigid_patches_are_their_own():
         same = np.diff(labels, axis=axis) == 0
         expected = np.take(frames, range(127), axis)[..., axis]
         near = np.abs(step - expected).max(axis=-1) < 0.01
-        # If the exemplar is periodic, coordinates wrap.
+        # The share is below 1, because coordinates wrap in a periodic exemplar.
         assert near[same].mean() > 0.95
 
 
@@ -160,7 +160,7 @@ def test_elements_keep_their_share_and_number(kind):
         before, after = volume.integrity(exemplar, source).density
         numbers.append(after / before)
     assert abs(np.mean(shares) - 1) < 0.05
-    assert abs(np.mean(numbers) - 1) < 0.12  # twenty elements: one draw scatters by a tenth
+    assert abs(np.mean(numbers) - 1) < 0.12  # The number of twenty elements varies by a tenth.
 
 
 def test_elements_are_counted_without_bias():

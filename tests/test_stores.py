@@ -191,7 +191,7 @@ def test_levels_of_odd_sizes_and_of_classes() -> None:
     voted = halve_block(block, 3, labelled=True)
     for at in np.ndindex(voted.shape):
         part = block[tuple(slice(2 * i, 2 * i + 2) for i in at)]
-        # Odd ends count twice.
+        # A block at an odd end is smaller, so its values count twice.
         repeat = [2 // n for n in part.shape]
         votes = np.bincount(np.tile(part, repeat).reshape(-1), minlength=3)
         assert voted[at] == votes.argmax()
@@ -380,7 +380,7 @@ def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
         stores.map_to_zarr(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
     with pytest.raises(FileError, match="contains other data"):
         stores.map_to_zarr(np.zeros, [2, 2], tmp_path / "m.zarr")
-    # cloudpickle sends the function.
+    # A lambda is sent to the workers by cloudpickle.
     stores.map_to_zarr(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)
     assert stores.open_store(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
 
@@ -463,7 +463,7 @@ def test_workers_go_by_the_limits_of_who_asks(scheduler: int | str | None, reque
     with texrs.limits.context(pixels=1000, voxels=2000, memory=3e8, seconds=60):
         ((_, found),) = workers.run(read_limits, [0], where)
     assert (found.pixels, found.voxels, found.memory) == (1000, 2000, 3 * 10**8)
-    # Work for others does not have these limits.
+    # Work outside the block does not have these limits.
     ((_, found),) = workers.run(read_limits, [0], where)
     assert (found.pixels, found.voxels) == (2**28, 2**28)
 

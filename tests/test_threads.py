@@ -32,7 +32,7 @@ def test_results_come_in_order(count: int) -> None:
     with texrs.threads(count), SideBySide(4) as beside:
         for _ in range(2):
             made = beside.do(work, range(3), lambda number, share: seen.append((number, share)))
-            # Inside, the number of threads is the same as outside.
+            # Tasks have the same number of threads as the caller.
             assert made == [(0, count), (1, count), (4, count)]
     assert {share for _, share in seen} <= {0.0, 0.5}
 

@@ -88,7 +88,7 @@ def test_a_joint_followed_from_a_small_picture_is_about_as_cheap_as_the_cheapest
         for overlap in {*range(25, most + 1, 9), found.joint.width}
     }
     assert cost[found.joint.width] == pytest.approx(found.cuts[0].value, rel=1e-3)
-    # The cheapest of all may lose more of the image, or not fit.
+    # A cheaper joint may exist, but it loses more of the image, or its parts do not fit.
     assert found.cuts[0].value <= 1.3 * min(cost.values())
 
 
@@ -108,7 +108,7 @@ def test_few_cuts_are_made_at_the_full_size(monkeypatch):
 @pytest.mark.parametrize("name", ["beans", "pebbles"])
 def test_cuts_spare_the_inside_of_things(name):
     guide = guidance(as_image(picture(name)))
-    # There are light elements on a dark background.
+    # The elements are lighter than the background.
     depth = np.clip((guide.mean(axis=-1) - 0.35) / 0.1, 0, 1).astype(np.float32)
     deep = []
     for given in (0 * depth, depth):
@@ -148,7 +148,7 @@ def test_a_lattice_is_cut_at_whole_periods_and_the_report_contains_the_reason(na
         made.report["resized"][key]
         == f"256 -> {length} pixels: {round(length / period)} whole periods of about {period}"
     )
-    # The overlap is minimal: less than half a period longer.
+    # The result loses less than 1.5 periods, because the overlap is shorter than half a period.
     assert length > 256 - 1.5 * period
 
 
@@ -159,7 +159,7 @@ def test_a_lattice_closes_at_sizes_larger_than_the_picture():
     image = np.tile((unit - unit.min()) / np.ptp(unit), (5, 4))[:160, :170].astype(np.float32)
     made = texrs.tile(image, size=(205, 285))
     assert made.report["method"] == "quilt"
-    # There are five of each, so they are 41 and 57 pixels long.
+    # Five periods fit the result along each axis, so they are 41 and 57 pixels long.
     off = np.abs(made.image - np.roll(made.image, (41, 57), (0, 1))).mean()
     assert off < 0.15 * made.image.std(), off / made.image.std()
 
@@ -201,7 +201,7 @@ def test_an_open_second_cut_reopens_the_first_wrap():
     guide, run, torn = sheared(), {}, {}
     for closed in (False, True):
         source = join_rows(guide, closed)
-        # Rows where the two sides of the wrap come from different ends of the image.
+        # Count the rows where the two sides of the wrap come from different ends of the image.
         torn[closed] = int((source.label[:, 0] != source.label[:, -1]).sum())
         inner, across = jumps(source.render(guide), 1)
         run[closed] = worst_run(across) / np.percentile(inner, 99)

@@ -69,7 +69,7 @@ def test_light_that_differs_at_the_ends_does_not_tile():
 
 
 def test_a_lattice_out_of_step_does_not_tile():
-    # Any two lines of noise differ equally. Only lines a period apart give evidence.
+    # Any two lines of noise differ equally, so only lines one period apart show whether the lattice continues.
     image = np.tile(np.random.default_rng(3).integers(0, 256, (20, 28, 3), dtype=np.uint8), (7, 6, 1))
     assert texrs.check_tiling(image).tiles == (True, True)
     assert texrs.check_tiling(image[:131, :150]).tiles == (False, False)

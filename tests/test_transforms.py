@@ -17,7 +17,7 @@ SIDE = 96
 SAMPLE = texrs.samples.load("dots", size=(SIDE, SIDE))
 IMAGE, LABELS = SAMPLE.image, SAMPLE.labels
 ROWS, COLUMNS = np.indices((SIDE, SIDE)).astype(np.int32)
-# left, top, right, bottom, and the label that the box surrounds.
+# Each row has left, top, right, bottom, and the label that the box surrounds.
 BOXES = np.array(
     [
         [
@@ -44,7 +44,7 @@ def test_labels_and_everything_else_follow():
     assert made.image.shape == IMAGE.shape
     assert made.image.dtype == IMAGE.dtype
     assert not np.array_equal(made.image, IMAGE)
-    # Maps of coordinates that were transformed too give the source of each pixel.
+    # Transformed maps of coordinates give the source of each pixel.
     rows, columns = (AUGMENT(IMAGE, each, seed=3).mask for each in (ROWS, COLUMNS))
     assert np.array_equal(made.image, IMAGE[rows, columns])
     assert np.array_equal(made.mask, LABELS[rows, columns])
@@ -65,7 +65,7 @@ def test_boxes_are_around_what_is_seen_of_them():
             size = (BOXES[int(label) - 1, 2:4] - BOXES[int(label) - 1, :2])[::-1]
             whole += own.shape == tuple(size) and own.sum() == (label == LABELS).sum()
             assert own.any()
-    # Most are whole elements, in equally tight boxes.
+    # Most boxes contain whole elements and are as tight as the original boxes.
     assert whole >= seen / 2
 
 

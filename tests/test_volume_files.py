@@ -70,7 +70,7 @@ def test_nrrd_of_other_programs_is_read(tmp_path, encoding, endian):
     data = volume.astype(volume.dtype.newbyteorder("<>"[endian == "big"]))
     nrrd.write(str(tmp_path / "a.nrrd"), data.T, {"encoding": encoding, "endian": endian})
     assert_array_equal(tio.read_volume(tmp_path / "a.nrrd"), volume)
-    # There are four axes, and the slowest is the channels.
+    # Write a volume with four axes, whose slowest axis contains the channels.
     four = make.picture((6, 4, 5, 2), "float32")
     header = {"encoding": encoding, "kinds": ["domain", "domain", "domain", "list"]}
     nrrd.write(str(tmp_path / "b.nrrd"), np.moveaxis(four, -1, 0).T, header)
@@ -145,7 +145,7 @@ def test_surfaces(tmp_path):
     tio.write_surface(tmp_path / "a.stl", corners, faces)
     data = (tmp_path / "a.stl").read_bytes()
     assert len(data) == 84 + 50 * 4
-    assert not data.startswith(b"solid")  # otherwise the file would count as text
+    assert not data.startswith(b"solid")  # A file that begins with "solid" would count as text.
     assert struct.unpack("<I", data[80:84]) == (4,)
     facet = np.frombuffer(data[84:], [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
     assert_array_equal(facet["c"], corners[faces])

@@ -55,7 +55,7 @@ def test_a_hole_has_no_step_at_its_border(name: str) -> None:
     assert (result.image[~hole] == volume[~hole]).all()
     assert measure_step(result.image, hole) <= 1.2
     assert result.image.dtype == volume.dtype
-    # The map alone is exact, and never points into the hole.
+    # The source map without the correction is exact, and never points into the hole.
     np.testing.assert_array_equal(result.source_map.render([given]), result.stages["before_blending"])
     places = np.rint(result.source_map.coordinates).astype(int)
     assert not hole[tuple(np.moveaxis(places, -1, 0))].any()
@@ -81,7 +81,7 @@ def test_smaller_patches_are_tried_if_the_border_of_a_hole_shows() -> None:
     assert steps[0] < 0.85 * steps[1]
     assert made.report["candidates"][0] == [usual, round(steps[1], 3)]
     assert least <= made.report["patch_size"] < usual
-    # The first size stays if its border is invisible.
+    # Only the first size is tried if the border is invisible.
     stripes = samples.stripes((40, 40, 40)).image
     assert len(texrs.inpaint(stripes, hole, seed=1).report["candidates"]) == 1
 
@@ -106,7 +106,7 @@ def test_labels_are_not_mixed() -> None:
 def test_the_correction_can_be_left_out() -> None:
     volume = make_noise()
     hole = make_ball(volume.shape, 8)
-    # A given patch size, because the border after the correction decides whether other sizes are tried.
+    # Pass a patch size, because the border after the correction decides whether other sizes are tried.
     plain = texrs.inpaint(volume, hole, screening=0, patch_size=10)
     assert (plain.image == plain.stages["before_blending"]).all()
     assert (texrs.inpaint(volume, hole, patch_size=10).stages["before_blending"] == plain.image).all()

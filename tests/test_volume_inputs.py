@@ -82,7 +82,7 @@ def test_imagej_states_the_spacing(tmp_path):
     tio.write_volume(tmp_path / "c.tif", coloured, spacing=(3, 2, 1))
     assert tio.read_volume(tmp_path / "c.tif").shape == coloured.shape
     assert tio.read_spacing(tmp_path / "c.tif") == (3, 2, 1)
-    # One stack states nothing, and one has several planes without a spacing.
+    # The first stack states nothing. The second one has several planes, but states no distance between them.
     tio.write_volume(tmp_path / "d.tif", volume)
     assert tio.read_spacing(tmp_path / "d.tif") is None
     tifffile.imwrite(tmp_path / "e.tif", volume, resolution=(72, 72))
@@ -145,10 +145,10 @@ def test_orientation_origin_and_units_of_nifti_go_through(tmp_path):
             assert made.header.get_xyzt_units() == ("mm", "sec")
             np.testing.assert_array_equal(np.asarray(made.dataobj).T, volume[:10, :12, :14])
             np.testing.assert_array_equal(tio.read_volume(tmp_path / name), volume[:10, :12, :14])
-    # Another spacing keeps the directions.
+    # A given spacing replaces the lengths of the axes, and keeps their directions.
     tio.write_volume(tmp_path / "c.nii", volume, spacing=(3.2, 0.7, 0.7), like=tmp_path / "a.nii.gz")
     np.testing.assert_allclose(nibabel.load(tmp_path / "c.nii").affine[:3, 2], (0, 0, 3.2), atol=1e-6)
-    # The spacing is kept in another kind of file.
+    # A file of another format keeps the spacing.
     tio.write_volume(tmp_path / "c.nrrd", volume, like=tmp_path / "a.nii.gz")
     np.testing.assert_allclose(tio.read_spacing(tmp_path / "c.nrrd"), (1.6, 0.7, 0.7), rtol=1e-6)
 

@@ -39,7 +39,7 @@ def test_cuts_along_the_axes_are_slices(dtype):
 def test_cuts_in_any_direction():
     ramp = np.einsum("i,ijkl->jkl", [3.0, 5.0, 7.0], np.indices((20, 24, 28))).astype(np.float32)
     normal = np.array([1, -2, 0.5])
-    steps = np.array([[2.0, 1, 0], [0.5, 0.5, 1]])  # both across the normal
+    steps = np.array([[2.0, 1, 0], [0.5, 0.5, 1]])  # Both steps are perpendicular to the normal.
     assert_allclose(steps @ normal, 0)
     cut = volume.oblique_slice(ramp, (9, 11, 13), axes=steps, size=(5, 7))
     at = np.array([9, 11, 13]) + np.arange(-2, 3)[:, None, None] * steps[0] + np.arange(-3, 4)[:, None] * steps[1]
@@ -55,9 +55,9 @@ def test_cuts_in_any_direction():
 
 def test_the_cube_shows_its_faces():
     v = np.zeros((20, 20, 20, 3), np.uint8)
-    v[0, ..., 0] = 255  # the front is red,
-    v[0:, 0, :, 1] = 255  # the top green,
-    v[0:, :, -1, 2] = 255  # the right blue
+    v[0, ..., 0] = 255  # The front is red.
+    v[0:, 0, :, 1] = 255  # The top is green.
+    v[0:, :, -1, 2] = 255  # The right face is blue.
     picture = volume.render_block(v, 200)
     rows, columns = picture.shape[:2]
     assert max(rows, columns) == 200
@@ -152,7 +152,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
     assert vertices.max(0)[0] > 45
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     _, shared = np.unique(edges, axis=0, return_counts=True)
-    assert (shared % 2 == 0).all()  # no edge has only one triangle
+    assert (shared % 2 == 0).all()  # Each edge belongs to an even number of triangles.
     io.write_surface(tmp_path / "particles.stl", vertices, faces)
     assert (tmp_path / "particles.stl").stat().st_size == 84 + 50 * len(faces)
     corner = np.zeros((4, 4, 4), bool)

@@ -82,13 +82,13 @@ def test_particles_are_counted(particles):
     inside = particles.labels > 0
     found = volume.component_statistics(inside)
     sizes = np.bincount(particles.labels.ravel())[1:]
-    # Pieces that the border separates count separately.
+    # Parts of a particle that the border separates count separately.
     assert len(particles.centres) <= found.count <= 1.6 * len(particles.centres)
     assert found.density == pytest.approx(1e5 * found.count / inside.size)
     assert found.mean * found.count == pytest.approx(sizes.sum(), rel=0.02)
     assert found.deciles[0] <= found.deciles[4] <= found.deciles[8]
     blocks = np.zeros((9, 9, 9), bool)
-    blocks[0:2, 0:2, 0:2] = blocks[4:7, 4:7, 4:7] = blocks[7, 7, 7] = True  # the last touches only at a corner
+    blocks[0:2, 0:2, 0:2] = blocks[4:7, 4:7, 4:7] = blocks[7, 7, 7] = True  # The last block touches only at a corner.
     three = volume.component_statistics(blocks, least=1)
     assert (three.count, three.mean, three.median) == (3, 12, 8)
     assert three.deciles == (1, 1, 1, 8, 8, 8, 27, 27, 27)
@@ -190,7 +190,7 @@ def test_copies_are_coherent_and_noise_is_not(axes):
     found = volume.cell_reuse(source_of(halves, shape))
     assert found.largest == 0.5
     assert found.coherent > 0.9
-    assert found.unused == pytest.approx(1 / 3)  # of the cells of 8, pixels 16 to 24 are not used
+    assert found.unused == pytest.approx(1 / 3)  # Pixels 16 to 24, one of three cells, are not used.
     assert found.most_used == pytest.approx(2)
 
 
@@ -247,7 +247,7 @@ def test_an_exemplar_is_like_itself(particles):
     assert_allclose(report.relative_shares, 1)
     assert report.frequency_ratio == 1
     assert report.values < 0.01
-    # The angle of a cosine that is 1 except for its last bits.
+    # The cosine of the angle is 1 except for its last bits, so the angle is not exactly 0.
     assert report.turned == pytest.approx(0, abs=1e-5)
     assert report.particles[0] == report.particles[1]
     assert report.reuse == volume.CellReuse(1.0, 1.0, 1.0, 0.0)

@@ -55,7 +55,7 @@ def test_what_lies_in_front_hides_what_is_behind() -> None:
 def test_by_default_what_stands_out_is_seen() -> None:
     image = PARTICLES.image
     seen = volume.render_volume(image, 96, **FRONT)
-    # A pixel is covered if a particle is behind it, and hardly otherwise.
+    # A pixel is opaque if a particle is behind it, and otherwise nearly transparent.
     column = (PARTICLES.labels > 0).sum(axis=0)
     scale = seen.shape[0] / (48 * 1.04)
     rows, columns = np.mgrid[:48, :48]
@@ -102,7 +102,7 @@ def test_transfer_functions() -> None:
     assert_array_equal(volume.render_volume(grey, 32, transfer=text), volume.render_volume(grey, 32, transfer=stops))
     seen = volume.render_volume(grey, 64, azimuth=90, elevation=0, transfer=text, shading=False)
     covered = np.flatnonzero(seen[32, :, 3])
-    assert (covered.max() - covered.min()) < 64 * 0.35  # There is only a sheet of the visible values.
+    assert (covered.max() - covered.min()) < 64 * 0.35  # Only a thin sheet has visible values.
     assert seen[32, covered, 0].max() > 150
     assert parse_transfer("0.5:own:1") == [(0.5, None, 1.0)]
 

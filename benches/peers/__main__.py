@@ -119,7 +119,7 @@ def compare(name: str, row: Row, results: dict[str, np.ndarray]) -> None:
 
 def describe(row: Row, first: dict[str, Any], times: dict[str, list[float]], absent: dict[str, str]) -> dict[str, Any]:
     """Return a row as printed."""
-    # Use the minimum of wall times, because other work of the machine makes all others longer.
+    # Use the minimum of wall times, because other work of the machine lengthens the others.
     middle: Callable[[list[float]], float] = min if row.wall else lambda taken: float(np.median(taken))
     base = middle(next(iter(times.values())))
     rows = [

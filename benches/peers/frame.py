@@ -142,7 +142,7 @@ def be_side(name: str, who: str, file: str) -> None:
 
 def read_memory(what: str = "VmRSS") -> float:
     """Return the megabytes of this process, or with VmHWM the peak since the last call without it."""
-    # Writing 5 there resets the peak, which preparation may have reached.
+    # Writing 5 to clear_refs resets the peak, so that it does not include the preparation.
     if what == "VmRSS" and Path("/proc/self/clear_refs").exists():
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     status = Path("/proc/self/status")
@@ -152,5 +152,5 @@ def read_memory(what: str = "VmRSS") -> float:
 
 
 if __name__ == "__main__":
-    # Use the module object of this file that the rows import, because of its class Timed.
+    # Run the module `frame` that the rows import, because its class Timed must be the same object.
     importlib.import_module("frame").be_side(*sys.argv[1:])

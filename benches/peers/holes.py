@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from frame import Arrays, Row, Side, Timed, Work
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # Import fillers, which tables also use.
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # The module fillers is shared with the tables.
 PATCH = 9
 GIVEN = 32
 EVEN = 2.0
@@ -88,7 +88,7 @@ def measure_patches(truth: np.ndarray, made: np.ndarray, hole: np.ndarray) -> fl
         patches = sliding_window_view(picture.mean(-1, dtype=np.float32), (PATCH, PATCH))[at[:, 0], at[:, 1]]
         patches = patches.reshape(len(at), -1)
         patches = patches - patches.mean(1, keepdims=True)
-        # Do not compare the noise of plain patches.
+        # Limit the norm from below, so that the noise of plain patches is not compared.
         return patches / np.maximum(np.linalg.norm(patches, axis=1, keepdims=True), EVEN * PATCH)
 
     wanted, best = cut(made, new), np.zeros(len(new))

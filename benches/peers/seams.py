@@ -69,7 +69,7 @@ def make_ring(side: int) -> dict[str, Any]:
     core, patch = binary_erosion(everywhere, iterations=side // 3), binary_erosion(everywhere)
     rim = patch & ~binary_erosion(patch)
     costs = cost_edges(a, b)
-    # Pairs that leave the patch are not edges of the overlap.
+    # Pairs with a pixel outside the patch are not edges of the overlap, so they cost nothing.
     for axis, cost in enumerate(costs):
         cost[~(patch & np.roll(patch, -1, axis))] = 0
     source, sink = np.where(rim, 2**31, 0), np.where(core, 2**31, 0)

@@ -97,7 +97,7 @@ def run_process(given: Arrays, command: list[str], made: str, where: str | None 
     with tempfile.TemporaryDirectory() as folder:
         io.imsave(f"{folder}/in.png", given["image"], check_contrast=False)
         single = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-        # Keep byte code, as for any installed program. The first run, which does not count, writes it.
+        # Keep byte code, as installed programs do. The first run, which is not measured, writes it.
         single["PYTHONDONTWRITEBYTECODE"] = ""
         words = [word.format(folder=folder) for word in command]
         subprocess.run(

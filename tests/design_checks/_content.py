@@ -280,7 +280,7 @@ def census(before: np.ndarray, size_before: int, after: np.ndarray, size_after: 
         return D8(np.nan, np.nan, len(before), False)
     per_area = (len(after) / size_after) / (len(before) / size_before)
     median = float(np.median(after) / np.median(before)) if len(after) else 0.0
-    # Draw with replacement: find the range of the median in 2 of 3 other samples of as many elements.
+    # Draw samples of the same size with replacement, to find the range that contains the median of 2 in 3 samples.
     draws = np.random.default_rng(0).choice(before, (400, len(before)))
     sure = np.quantile(np.median(draws, axis=1), (1 / 6, 5 / 6)) / np.median(before)
     return D8(per_area, median, len(before), True, (min(1.0, 1 / float(sure[1])), max(1.0, 1 / float(sure[0]))))

@@ -79,7 +79,8 @@ def nearest_patches(
     size = channels * side * side
     mine = np.lib.stride_tricks.sliding_window_view(image.astype(np.float32), (side, side), axis=(0, 1))
     queries = mine[at[:, 0], at[:, 1]].reshape(len(at), size)
-    # Distances as |q|^2 + |p|^2 - 2 q p lose digits if colours share a large offset.
+    # Subtract the mean, because distances computed as |q|^2 + |p|^2 - 2 q p lose digits if colours share a large
+    # offset.
     centre = queries.mean()
     queries = queries - centre
     square = (queries.astype(np.float64) ** 2).sum(axis=1)

@@ -64,7 +64,7 @@ def d9(
     """
     counts = dict.fromkeys(kinds, 0)
     good, number = True, 0
-    # The log rounds to three decimals.
+    # Amounts in the log are rounded to three decimals.
     slack = 5.1e-4
     for kind, amount, axis in draws:
         number += 1
@@ -184,7 +184,7 @@ def d12(source: Any, *, reach: int = 6, tolerance: float = 1.5) -> D12:
             one, other = (np.roll(places, by, axis) for by in (-step, step - 1))
             of_one, of_other = (np.roll(source.exemplar, by, axis) for by in (-step, step - 1))
             same &= (np.abs(one - other).max(axis=-1) < tolerance) & (of_one == of_other)
-        # Within the tolerance two neighbouring lines may both be axes. Count the first.
+        # Within the tolerance, two neighbouring lines may both count as axes, so count only the first.
         length += int((same & ~np.roll(same, 1, axis)).sum())
     return D12(length / sum(places.shape[:2]))
 
@@ -219,7 +219,7 @@ def d13(source: Any) -> D13:
         cell = np.clip(np.rint(source.coordinates[source.exemplar == number]).astype(int), 0, np.array(shape) - 1) // 8
         size = [-(-n // 8) for n in shape]
         shown = np.bincount(cell[:, 0] * size[1] + cell[:, 1], minlength=size[0] * size[1]).astype(float)
-        # Cells at the far sides may be smaller.
+        # Cells at the far sides may be smaller, so divide by the area of each cell.
         area = np.outer(*(np.bincount(np.arange(n) // 8) for n in shape)).ravel()
         density = shown / area
         part = area * density / max(shown.sum(), 1)

@@ -41,7 +41,7 @@ def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
     places = source.coordinates
     inside = bool((places >= -1e-3).all() and (places <= bounds + 1e-3).all())
     if floats:
-        # Cubic lookups may overshoot, but are limited to the exemplar's range.
+        # Cubic interpolation could overshoot, but results must stay in the exemplar's range.
         inside &= bool(image.min() >= exemplar.min() - 1e-6 and image.max() <= exemplar.max() + 1e-6)
     return D1(
         image.shape == (*size, *np.asarray(exemplar).shape[2:]) and image.dtype == exemplar.dtype,

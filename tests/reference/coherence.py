@@ -56,7 +56,8 @@ class Exemplar:
         out = []
         for x, n, w, b in zip(place, self.shape, self.wrap, self.border, strict=True):
             near = (x + ONE // 2) // ONE
-            # Only the nearest sample decides whether the window is outside. Fractions are kept.
+            # The nearest sample decides whether the window is inside. A coordinate whose window is inside keeps its
+            # fraction.
             held = x if b <= near < n - b else min(max(near, b), n - 1 - b) * ONE
             out.append(x % (n * ONE) if w else held)
         return tuple(out)

@@ -44,7 +44,7 @@ def weights(kind, t):
     """Return the samples around a coordinate, as steps from the lower one, with their weights. ``t`` is the fraction."""
     if kind == "linear":
         return [(0, 1 - t), (1, t)]
-    # Catmull-Rom: Keys's kernel with a = -1/2, by the distance of each sample.
+    # Use Catmull-Rom weights (Keys's kernel with a = -1/2), which depend on the distance of each sample.
     near = lambda x: 1.5 * x**3 - 2.5 * x**2 + 1  # noqa: E731
     far = lambda x: -0.5 * x**3 + 2.5 * x**2 - 4 * x + 2  # noqa: E731
     return [(-1, far(1 + t)), (0, near(t)), (1, near(1 - t)), (2, far(2 - t))]
@@ -63,7 +63,7 @@ def sample(exemplar, places, kind, wraps):
         values = exemplar[indices(below + steps, exemplar.shape, wraps)].astype(np.float64)
         weight = np.prod(parts, axis=0).reshape(-1, *[1] * (values.ndim - 1))
         total += weight * values
-        # Samples without weight do not count for the range.
+        # Samples of weight 0 do not extend the range to which cubic results are clipped.
         low = np.where(weight != 0, np.minimum(low, values), low)
         high = np.where(weight != 0, np.maximum(high, values), high)
     if kind == "cubic":

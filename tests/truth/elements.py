@@ -205,7 +205,7 @@ def self_splice_in_another_size() -> Parts:
 def segments() -> Parts:
     parts: dict[str, object] = {}
     pictures = {name: colour(name, 96, 96) for name in SEGMENTED}
-    # Few colours give many ties.
+    # An image of few colours has many equal differences.
     pictures["few colours"] = colour("pebbles", 64, 64) & 0xE0
     for name, picture in pictures.items():
         found = segment(picture, SEGMENTED.get(name, ElementOptions()))

@@ -21,34 +21,34 @@ def sample(name: str, *size: int, **options: Any) -> Sample:
 
 
 def colour(name: str, *size: int, **options: Any) -> Array:
-    """Return it unchanged: RGB of 8 bits."""
+    """Return the sample unchanged: RGB of 8 bits."""
     return sample(name, *size, **options).image
 
 
 def grey(name: str, *size: int, **options: Any) -> Array:
-    """Return one channel of it."""
+    """Return one channel of the sample."""
     return np.ascontiguousarray(colour(name, *size, **options)[..., 1])
 
 
 def classes(name: str, *size: int, **options: Any) -> Array:
-    """Return it as labels from 0 on."""
+    """Return the sample as labels from 0 on."""
     values = grey(name, *size, **options) // 43
     return values - values.min()
 
 
 def deep(name: str, *size: int, **options: Any) -> Array:
-    """Return it in grey of 16 bits, all of which are used."""
+    """Return the sample in grey of 16 bits, all of which are used."""
     image = colour(name, *size, **options).astype(np.uint16)
     return np.ascontiguousarray(image[..., 0] << 8 | image[..., 1])
 
 
 def floats(name: str, *size: int, **options: Any) -> Array:
-    """Return it as floats that reach beyond [0, 1]."""
+    """Return the sample as floats that reach beyond [0, 1]."""
     return colour(name, *size, **options).astype(np.float32) / np.float32(128) - np.float32(0.25)
 
 
 def clear(name: str, *size: int, **options: Any) -> Array:
-    """Return it with an alpha channel."""
+    """Return the sample with an alpha channel."""
     image = colour(name, *size, **options)
     return np.concatenate([image, 255 - image[..., :1] // 2], axis=-1)
 

@@ -97,7 +97,7 @@ def read() -> Lines:
 
 def write(lines: Lines) -> None:
     """Store the table, replacing the former one."""
-    # Several processes may do this at once. Each writes the same.
+    # Use a name of this process, because several processes may write the same table at once.
     whole = STORED.with_name(f"{STORED.name}.{os.getpid()}")
     whole.write_text(json.dumps(lines, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     whole.replace(STORED)
