@@ -84,7 +84,7 @@ class Light:
 
 def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
     """Return the light of each marked part of an image (H, W, C), or None for parts in even light."""
-    # The last of two or four channels is alpha.
+    # Leave out alpha, the last of two or four channels, because it is not light.
     colours = image[..., :-1] if image.shape[-1] in (2, 4) else image
     if image.dtype.kind not in "uf" or (image.dtype.kind == "f" and not (colours >= 0).all()):
         return [None] * len(parts)

@@ -143,7 +143,7 @@ def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[
             seen = seen * there + mean * (1 - there)
         values[part] = np.swapaxes(shrink(np.swapaxes(seen, 0, 1), shape[1:]), 0, 1)
     bright = log_single(np.maximum(shrink(values, shape), np.float32(LEAST)))[..., 0].astype(np.float64)
-    # Start from local means, which allow elements to be separated in any light.
+    # Start from local means, because the brightness relative to them separates elements in any light.
     few, waves = reduce(shape), [min(MOST, max(1, round(n / over))) for n in pixels.shape[:2]]
     bells = [smooth(few[k], over / 2 * few[k] / pixels.shape[k], wrap[k]) for k in (0, 1)]
     low = enlarge(np.einsum("kl,il->ik", bells[1], np.einsum("ij,jl->il", bells[0], shrink(bright, few))), shape, wrap)

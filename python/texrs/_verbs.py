@@ -67,7 +67,7 @@ def takes_materials(
 
         @wraps(verb)
         def run(*args: P.args, **kwargs: P.kwargs) -> T:
-            # Repeat these notices, so that the report contains them even if the input was read earlier.
+            # Repeat the notices of the inputs, so that the report contains them even if an input was read earlier.
             with collect() as notices:
                 for value in (*args, *kwargs.values()):
                     for each in _as_list(value):

@@ -77,7 +77,7 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     at = np.asarray(at, np.float64)
     if not 3 <= len(at) <= MOST:
         raise InvalidInput(f"places: must be between 3 and {MOST} points, got {len(at)}")
-    # Pixels extend half a pixel around their centres.
+    # Points may be half a pixel beyond the centres of border pixels, because pixels extend that far.
     outside = ((at < -0.5) | (at > np.array(shape) - 0.5)).any(axis=1)
     if outside.any():
         raise InvalidInput(f"places: must be inside the size {shape}, got {at[outside][0].tolist()}")

@@ -156,7 +156,7 @@ def rectify(
     known, _ = _lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
     laid, grown = _grow(texture, asked, cyclic, number, watch)
-    # Seams of a grown texture are corrected like those of any other.
+    # Correct the seams of a grown texture with the options of the verb that grew it.
     rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
     source = laid.compose(known).with_finish(cyclic, interpolation=interpolation, antialias=True, **rest)
     # A texture that was not grown does not have to be rendered again.
@@ -305,7 +305,8 @@ def _find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
     best = (0, 0, 0, 0, 0)
     for row in range(rows):
         heights[:-1] = np.where(cells[row], heights[:-1] + 1, 0)
-        # Keep columns of growing heights: each gives a rectangle as far as it is the lowest.
+        # Keep a stack of columns with growing heights. A column gives a rectangle over all columns where it is the
+        # lowest.
         open_: list[tuple[int, int]] = []
         for column, height in enumerate(heights.tolist()):
             start = column

@@ -182,7 +182,7 @@ def remove(
         seed=number,
         progress=progress,
     )
-    # The source map contains the steps after copying, so that other maps get the same ones.
+    # Store the steps after copying in the source map, so that they can be applied to other maps.
     how = made.finish(screening, (0, 0) if follow else None)
     how |= {"known": (~hole,)} if how else {}
     how |= {"fade": np.rint(255 * fade(inner, asked.feather)).astype(np.uint8)} if asked.feather else {}

@@ -293,7 +293,7 @@ def inpaint(
         result = apply(places, pictures, progress=progress)
     watch("done", 1.0)
     bare = pictures[0].copy()
-    # Fill the hole with the smallest known value for the stage, so that its range does not change.
+    # In the stage, fill the hole with the smallest known value, so that the range of values does not change.
     bare[open_] = 0 if open_.all() else bare.min()
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200

@@ -86,7 +86,7 @@ def fill_in_depth(
     if not whole.any():
         return None
     asked = plane.scales(np.argwhere(wide)).astype(np.float32)
-    # Flatten the plane, so that patches of any depth can be shown at the hole.
+    # Flatten the plane, so that patches of any depth can be copied to the hole.
     sheet = Flattened.of(guidance(as_image(paint_over(picture, open_))), plane, asked, whole)
     if not sheet.free.any():
         return None

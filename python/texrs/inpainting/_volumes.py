@@ -76,7 +76,7 @@ def is_volume(image: object, hole: object) -> bool:
         return image.axes == 3
     marks = as_marks(hole).marks
     sides: tuple[int, ...] = getattr(image, "shape", ())
-    # An image with few channels stays an image, whatever its hole.
+    # An array with few channels is an image, whatever marks its hole.
     deep = len(sides) == 4 or (len(sides) == 3 and sides[2] > MOST_CHANNELS)
     if is_value(marks):
         if isinstance(image, str | os.PathLike):

@@ -215,7 +215,7 @@ def digest(path: Path) -> str:
     record = _read_record(path, kind) if kind in _VERBATIM else b""
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data, memoryview(data) as view:
         begin = max(data.find(record), 0)
-        # In PNG, the checksum of a chunk follows its text.
+        # In PNG, leave out the checksum of the chunk, which follows its text.
         end = begin + len(record) + 4 * (kind == "png") if begin else 0
         whole = hashlib.sha256(view[:begin])
         whole.update(view[end:])

@@ -124,7 +124,7 @@ def detect_kind(path: Path) -> str:
         return "webp"
     if start[4:12] in (b"ftypavif", b"ftypavis"):
         return "avif"
-    # TGA files do not have a signature.
+    # TGA files do not have a signature, so use the suffix.
     if path.suffix.lower() == ".tga":
         return "tga"
     if path.suffix.lower() == RAW:
@@ -197,7 +197,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
         raise InvalidInput(
             f"array: must have sides of at most {form.longest} pixels for {suffix}, got shape {array.shape}"
         )
-    # GIF and HDR also limit the values.
+    # GIF and HDR also limit the values of pixels.
     if suffix == ".gif":
         colours = np.unique(array.reshape(-1, channels), axis=0)
         if len(colours) > 256:

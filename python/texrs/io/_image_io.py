@@ -19,7 +19,7 @@ def decode(path: Path, file: bytes, limit: int) -> tuple[Array, int]:
     Palettes are applied, and samples of fewer than 8 bits are scaled to 8. The size in the header is compared with the
     limit before anything is decoded: at most ``limit`` pixels, and 16 times as many bytes.
     """
-    # File names can contain bytes that are not valid UTF-8.
+    # Escape bytes of the file name that are not valid UTF-8.
     name = str(path).encode("utf-8", "backslashreplace").decode()
     samples, dtype, shape, orientation = _rust.decode_image(name, file, limit)
     pixels: Array = samples.view(dtype).reshape(shape)

@@ -46,7 +46,7 @@ DECODED = ("webp", "jpeg", "gif", "bmp", "tga", "dds", "psd", "avif", "jxl")
 """Formats that only Pillow can decode."""
 ANIMATED = ("gif", "png", "webp", "avif", "jxl")
 SAVED: dict[str, tuple[str, dict[str, Any]]] = {
-    # Do not subsample colours.
+    # Do not subsample colours, because that would blur their edges.
     ".jpg": ("JPEG", {"quality": 95, "subsampling": 0}),
     ".jpeg": ("JPEG", {"quality": 95, "subsampling": 0}),
     ".png": ("PNG", {}),
@@ -79,7 +79,7 @@ def read(path: Path, kind: str, file: bytes, limit: int) -> Array:
         _check_size(path, image, limit)
         _check_whole(path, kind, image, file)
         array = _take_pixels(path, image.convert("RGBA") if kind == "gif" else image)
-        # Pillow adds an alpha channel to these images even if the file has none.
+        # Pillow adds an alpha channel to these images even if the file has none, so remove it if it is opaque.
         if (image.mode == "P" or kind in ("gif", "dds")) and array.shape[2:] == (4,) and (array[..., 3] == 255).all():
             array = np.ascontiguousarray(array[..., :3])
         orientation = _rust.exif_orientation(bytes(image.info.get("exif", b"")).removeprefix(b"Exif\0\0"))
@@ -96,7 +96,7 @@ def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Se
                 pixels = _take_pixels(path, image)
             if pixels.shape[:2] != tuple(sides):
                 raise FileError(f"{path}: page {page + 1} has a different size in Pillow than in tifffile")
-            # Pillow has no signed modes and returns int16 as int32.
+            # Pillow has no signed modes and returns int16 as int32, so convert it back.
             if pixels.dtype.kind == dtype.kind == "i" and dtype.itemsize == 2:
                 pixels = pixels.astype(dtype)
             if pixels.itemsize == dtype.itemsize and dtype.kind in "ui":

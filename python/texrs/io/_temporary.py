@@ -117,7 +117,7 @@ def _sync(path: str | os.PathLike[str]) -> None:
     try:
         os.fsync(number)
     except OSError as error:
-        # Some file systems do not support fsync.
+        # Some file systems do not support fsync, so ignore their errors.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):
             raise
     finally:

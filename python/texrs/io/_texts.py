@@ -89,7 +89,7 @@ def read_html(path: Path) -> dict[str, Any]:
 def write_html(path: Path, notes: Metadata) -> None:
     """Write a record as a comment at the end of an HTML page."""
     if notes.made is not None:
-        # An HTML comment cannot contain two consecutive hyphens.
+        # An HTML comment cannot contain two consecutive hyphens, so escape them.
         text = notes.made.replace("--", "\\u002d\\u002d").encode()
         path.write_bytes(_COMMENT.sub(b"", path.read_bytes()) + b"<!-- texrs " + text + b" -->\n")
 

@@ -410,7 +410,7 @@ def _measure(compression: int, data: bytes, most: int) -> int:
     if compression == _PACKBITS:
         return _measure_packbits(data, most)
     try:
-        # tifffile also uses this module of Python 3.14, and cannot unpack zstd without it.
+        # Without this module of Python 3.14, tifffile cannot unpack zstd either.
         zstd: Any = import_module("compression.zstd")
     except ImportError:
         return 0

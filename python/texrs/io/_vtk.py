@@ -49,7 +49,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         pieces = root.findall("ImageData/Piece")
         if root.tag != "VTKFile" or len(pieces) != 1:
             raise FileError(f"{path}: must be image data (.vti) in exactly one piece")
-        # The extent counts points. There is one cell fewer along each axis.
+        # The extent counts points. Along each axis, there is one cell fewer than points.
         low, high = (np.array(pieces[0].get("Extent", "").split(), int)[a::2] for a in (0, 1))
         groups = {kind: pieces[0].find(kind) for kind in ("PointData", "CellData")}
         kind, group = next(((k, g) for k, g in groups.items() if g is not None and len(g)), ("", None))
@@ -151,7 +151,7 @@ def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
             f'<DataArray type="{kind}" Name="texture" NumberOfComponents="{channels}" format="appended" offset="0"/>\n'
             '</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n<AppendedData encoding="base64">\n_'.encode()
         )
-        # The length and the samples are encoded together.
+        # Encode the length and the samples as one base64 stream.
         head, data = little.nbytes.to_bytes(8, "little"), little.reshape(-1).view(np.uint8).data
         file.write(base64.b64encode(head + bytes(data[: _STEP - 8])))
         for start in range(_STEP - 8, len(data), _STEP):

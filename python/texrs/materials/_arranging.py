@@ -136,7 +136,7 @@ def _make_file(file: File, found: Mapping[str, Map], shape: tuple[int, ...], ste
         shares[word] = replace(found[word], pixels=(found[word].pixels + 1) / 2)
     made = join(shares, role, shape, stem)
     if role in (Role.LABPBR_NORMAL, Role.LABPBR_SPECULAR) and made.pixels.dtype != np.uint8:
-        # The codes of labPBR are defined for 8 bits.
+        # The codes of labPBR are defined for 8 bits, so convert the map.
         made = replace(made, pixels=to_pixels(to_share(made.pixels), np.dtype(np.uint8)))
     return made
 

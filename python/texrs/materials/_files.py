@@ -198,7 +198,7 @@ def name_profile(profile: bytes) -> str | None:
     from PIL import ImageCms
 
     title = "unknown"
-    # A damaged profile does not affect the result.
+    # Ignore a damaged profile, because only the notice contains its name.
     with suppress(OSError, ImageCms.PyCMSError):
         title = " ".join(ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).split())
     return None if "srgb" in title.lower() else title

@@ -47,7 +47,7 @@ def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
     """Return the features of a map, (..., C) float32. A difference of 1 is as visible as black next to white."""
     image = pixels if pixels.ndim > axes else pixels[..., np.newaxis]
     if role.normal or role is Role.VECTOR:
-        # Shading depends on x and y. The z component follows from them.
+        # Use only x and y of vectors, because shading depends on them, and z follows from them.
         vector = _decode(image)
         return vector[..., : min(2, vector.shape[-1])] * np.float32(0.5)
     if role is Role.HEIGHT:

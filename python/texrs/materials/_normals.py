@@ -95,7 +95,7 @@ def measure_y(each: Map, maps: Mapping[str, Map]) -> tuple[bool, float, str]:
     if min(vectors.shape[:2]) < 3:
         return each.role.down, 0.0, ""
     lean = -vectors[..., :2] / np.maximum(vectors[..., 2:], STEEP)
-    # Row indices increase downwards, so the slope along the rows has y down.
+    # Row indices increase downwards, so the slope along them is the negated y slope.
     right, along = lean[..., 0], -lean[..., 1]
     heights = _find_heights(each, maps)
     if heights is not None:

@@ -88,7 +88,7 @@ def write_mesh(
         prefix = f"{name}_" if len(names) > 1 else ""
         pictures |= {prefix + key: picture for key, picture in own.items()}
         looks.append((own, look))
-    # glTF contains everything. OBJ needs images, a file of materials and the mesh.
+    # A glTF file contains everything. An OBJ mesh needs separate files for images and materials.
     if suffix != ".obj":
         said = [looks[k][1] | ({} if name == PAINTED else {"name": name}) for name, k in materials]
         return write_shapes(list(_divide(surface, normals, owner)), pictures, said, target)
@@ -171,7 +171,7 @@ def _divide(
         faces = surface.faces[number.reshape(-1) == k]
         used, local = np.unique(faces, return_inverse=True)
         if len(keys) == 1:
-            # Keep vertices that no face uses.
+            # A mesh of a single part keeps all vertices, even if no face uses them.
             used, local = np.arange(len(surface.vertices)), faces
         kind = np.uint16 if len(used) < 2**16 - 1 else np.uint32
         yield (
@@ -192,7 +192,7 @@ def _divide(
 def _colour_corners(maps: Mapping[str, Map]) -> dict[str, Array]:
     """Return colours of vertices as linear 16-bit values, and all other maps as separate attributes."""
     base = find_map(maps, Role.COLOUR) or next(iter(maps.values()))
-    # Treat the vertices as an image of one row.
+    # Treat the vertices as an image of one row, because the functions for maps expect images.
     row = {name: Map(each.pixels[np.newaxis], each.role, each.space) for name, each in maps.items()}
     shown = Map(base.pixels[np.newaxis], Role.COLOUR, base.space)
     light = take_colour(shown, shown.pixels.shape[:2])[0]

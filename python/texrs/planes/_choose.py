@@ -103,7 +103,7 @@ def find_grounds(
 
     """
     free, found = known.copy(), []
-    # Given masks come first, and each takes its pixels from the later ones.
+    # Given masks have priority over found ones, and earlier masks over later ones.
     for _, ground in settled:
         if ground is not None:
             found.append(np.asarray(ground & free, np.bool_))

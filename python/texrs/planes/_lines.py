@@ -108,7 +108,7 @@ def find_lines(grey: Floats, known: Bools) -> Lines:
     border = inner & (steep > STEEP * np.sqrt(_look_around(steep**2, inner))) & (steep > 1e-4)
     crests, away = _mark_crests(steep, down, right)
     border &= crests
-    # Number these pixels, and list the pairs that are adjacent in any of eight directions.
+    # Number the border pixels, and list the pairs that are adjacent in any of eight directions.
     rows, columns = np.nonzero(border)
     number = np.full(grey.shape, -1, np.intp)
     number[rows, columns] = np.arange(len(rows))
@@ -120,8 +120,8 @@ def find_lines(grey: Floats, known: Bools) -> Lines:
     ]
     beside = np.concatenate([np.stack([a, b], axis=-1)[(a >= 0) & (b >= 0)] for a, b in pairs])
     slopes = np.stack([down[rows, columns], right[rows, columns]], axis=-1)
-    # Group slopes by eighths of a turn, and again by eighths that are shifted by half of one. A line at the limit of
-    # two eighths is in the middle of an eighth of the other grouping.
+    # Group slopes by eighths of a turn, and again by eighths that are shifted by half an eighth. A line at the limit
+    # of two eighths is in the middle of an eighth of the other grouping.
     parts = [_join(_tell_eighths(slopes, turn), beside) for turn in (0.0, np.pi / 8)]
     sizes = [np.bincount(part) if len(part) else np.zeros(1, np.intp) for part in parts]
     first = sizes[0][parts[0]] >= sizes[1][parts[1]]

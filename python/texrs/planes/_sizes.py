@@ -149,7 +149,7 @@ def measure_scale(image: object, *, known: object = None) -> ScaleEstimate:
     size = pixels.shape[0], pixels.shape[1]
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     try:
-        # Measure patterns on the plane, where they are most similar, or on the image if it is uncertain.
+        # Measure patterns on the plane, where they are most similar, or on the image if the plane is uncertain.
         plane = find(pixels, known=there)
         sure = plane.confidence >= SURE
         voices = list_patterns(pixels, there, plane if sure else Plane(size, 0.0))

@@ -100,7 +100,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
             lean = rng.uniform(-0.008, 0.008, 2)
             height = 2.3 * ramp(edge, -1.2, 2.6) + lean[0] * window.y + lean[1] * window.x
             height = height + rng.uniform(-0.2, 0.3) + np.float32(0.16) * fine[rows, cols]
-            # Dig pits into the brick. They are darkened below.
+            # Dig pits into the brick. Their colours are darkened below.
             hole = ramp(pits[rows, cols], 1.3, 2.4)
             height = height - 0.9 * hole
             tone = tones[rng.integers(len(tones))] * rng.uniform(0.75, 1.2)

@@ -92,7 +92,7 @@ class Scene:
         """Return the rectangle within `reach` rows and `wide` (default: `reach`) columns of `centre`."""
         axes, offsets = [], []
         for c, r, n in zip(centre, (reach, wide or reach), self.shape, strict=True):
-            # Take no sample twice if the torus is smaller than the rectangle.
+            # Do not take a sample twice if the torus is smaller than the rectangle.
             r = min(r, (n - 1) / (2 * _FINE))
             first = int(np.ceil((c - r) * _FINE))
             count = int(np.floor((c + r) * _FINE)) - first + 1

@@ -289,7 +289,7 @@ class SourceMap(Parted):
             raise InvalidInput(
                 f"map_type, green: must be one of colour, normal, vector, slope, and of up, down; got {map_type!r}, {green!r}"
             )
-        # Check the exemplars, because the sampled part of them may have no negative value.
+        # Look for negative values in the exemplars, because the sampled part may not contain any.
         bare = map_type == "normal" and self.axes == 2 and not stores_z(images)
         channels = 3 if (map_type == "normal" and not bare) or self.axes == 3 else 2
         return turn_all(self, out, map_type, green, any(float(e[..., :channels].min()) < 0 for e in images), bare)
