@@ -2,8 +2,9 @@
 
     python tests/fuzz_files.py [--count 100000] [--seed 1] [--seconds 600]
 
-Prints the numbers of read and refused files, and all other outcomes. Their files are kept next to it, named after seed
-and number. Everything runs in this process with limited memory, so excessive allocations fail here.
+Prints the numbers of read and refused files, and all other outcomes. Files with other outcomes are kept in the folder
+`fuzz-SEED`, named after their number. Everything runs in this process with limited memory, so excessive allocations
+fail here.
 """
 
 from __future__ import annotations

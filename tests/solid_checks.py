@@ -106,7 +106,7 @@ def s3(exemplar: np.ndarray, image: np.ndarray, tolerance: float = 0.2) -> Found
 def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
     """Particles have the same number and size; ``mask`` marks the particles of the exemplar.
 
-    They are counted in boxes of the exemplar's size, whose borders cut as many.
+    They are counted in boxes of the exemplar's size, whose borders cut as many particles.
     """
     there = made.source_map.render(mask.astype(np.uint8), interpolation="nearest") > 0
     before = volume.component_statistics(mask)
@@ -129,7 +129,8 @@ def s3b(mask: np.ndarray, made: Synthesis, *, turned: bool = False) -> Found:
 def s5(made: Synthesis, least: float = 0.65) -> Found:
     """Neighbours continue each other, but nothing is only copied, and no part of the exemplar is preferred.
 
-    In small volumes, a few cells of the start are a large share. Four may continue each other in one piece.
+    In small volumes, a few of the cells that the volume starts from are a large share of it, so four of them may form
+    one piece.
     """
     reuse = volume.cell_reuse(made.source_map)
     four = 4 * CELL**3 / made.source_map.label.size

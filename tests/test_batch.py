@@ -286,7 +286,7 @@ def test_stores_of_zarr_are_inputs(here: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> None:
-    """Ctrl-C reaches all processes of a terminal at once. The death of the first process reaches only itself."""
+    """Ctrl-C reaches all processes of a terminal at once. A kill reaches only the first process."""
     size = ["--set", "size=400", "--seeds", "0:4", "--workers", "2"]
 
     def heed() -> None:

@@ -149,7 +149,7 @@ def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
 
 
 def test_who_listens_outside_is_asked_from_within():
-    """A verb without progress passes on the requests of its own blocks."""
+    """A verb without a progress function passes requests of its inner blocks to the enclosing block."""
     told = []
     with answering(told.append, "outer"):
         inner = listen(None)

@@ -119,7 +119,7 @@ def test_slices_are_picked_from_the_same_texture() -> None:
 
 
 def test_seams_are_no_worse_than_those_of_a_bounded_texture() -> None:
-    """Overlapping boxes may consider the covered part from all sides."""
+    """Boxes overlap, and patches of a box fit the parts that are already covered on all sides."""
     turned = fields.circular(centre=(-40, -40), axes=2)
     for image, field in ((samples.load("pebbles").image[:96, :96], None), (samples.bricks((96, 96)).image, turned)):
         known = texrs.Exemplar(image)

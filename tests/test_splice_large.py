@@ -97,7 +97,7 @@ def test_outermost_points_do_not_make_a_layout_wider() -> None:
 
 
 def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarser systems and approximate matches pass through the whole splice."""
+    """Splices of large images use coarser systems and approximate matches throughout."""
     monkeypatch.setattr(energy, "MOST", 1 << 13)
     monkeypatch.setattr(_matching, "DENSE", 0)
     wall = ElementAnalysis.of_sample(samples.load("bricks", size=(128, 128)))

@@ -255,7 +255,7 @@ def test_edits_as_printed(step: str) -> None:
 
 
 def test_ground_is_as_rough_as_it_was() -> None:
-    """The smoothest patches fit best. Without a weight of roughness, such a background loses 20 % of it."""
+    """The smoothest patches fit best. Without a weight of roughness, a background loses 20 % of its roughness."""
     mine = make_discs(noise=0.08)
     image = mine.image.copy()
     smooth = (np.indices(mine.mask.shape)[1] // 40) % 2 == 1

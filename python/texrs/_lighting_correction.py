@@ -114,7 +114,7 @@ def flatten_lighting(
 
 
 def measure_unevenness(image: Array, space: Space | None = None) -> float:
-    """Return the brightness of the best lit part of an image divided by that of the worst lit part.
+    """Return the brightness of the best lit part of an image divided by the brightness of the worst lit part.
 
     The result is 1 without evidence of uneven light.
     """

@@ -28,7 +28,7 @@ class D5:
     """The same for the exemplar after the cyclic shift that fits best."""
     applies: bool = True
     own: float = 1.0
-    """Difference of the exemplar and its own repetition, as a share of the usual.
+    """Difference of the exemplar and its own repetition, as a share of the usual difference.
 
     Two lattices in phase do not differ by more.
     """
@@ -72,7 +72,7 @@ def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, 
 
 
 def repeats(example: np.ndarray) -> float:
-    """Return the minimum difference of an image and itself, shifted by 1/4 to 1/2 of its shorter side, over the usual."""
+    """Return the minimum difference of an image and itself, shifted by 1/4 to 1/2 of its shorter side, over the usual one."""
     height, width = example.shape[:2]
     size = (2 * height, 2 * width)
     spectrum = fft.rfft2(example, size, axes=(0, 1))
@@ -112,7 +112,7 @@ def best_shift(part: np.ndarray, example: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class D6:
-    """The colour correction keeps gradients away from seams, and the colours overall; of 255."""
+    """The colour correction keeps the colours, and the gradients that are not near seams; of 255."""
 
     median: float
     p99: float
@@ -212,7 +212,7 @@ class D8:
     """Number of elements in the exemplar."""
     applies: bool
     sure: tuple[float, float] = (1.0, 1.0)
-    """Range of the uncertainty of the exemplar's median area, as shares of it.
+    """Range of the uncertainty of the exemplar's median area, as shares of this median.
 
     Few elements of many sizes give a wide range.
     """

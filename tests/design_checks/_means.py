@@ -199,7 +199,7 @@ class D13:
 
     share: float
     favourite: float
-    """Compared with the mean of all cells."""
+    """Use of the most frequent cell, divided by the mean use of all cells."""
     applies: bool = True
     least: float = 0.49
     most: float = 5.35

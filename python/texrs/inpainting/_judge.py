@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 
 STRONG = 1.4
-"""Power of a difference. A few large differences are more visible than many small ones with the same sum."""
+"""Exponent of a difference. A few large differences are more visible than many small ones with the same sum."""
 
 Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 

@@ -176,7 +176,7 @@ def try_sides(
 
 
 def is_better(number: int, best: int, shown: Mapping[int, float]) -> bool:
-    """Return whether the seams of a size are less visible than those of the best larger one."""
+    """Return whether the seams of a size are less visible than the seams of the best larger size."""
     if number > best:
         return shown[number] < CLEARLY * shown[best]
     return CLEARLY * shown[number] <= min(shown.values())

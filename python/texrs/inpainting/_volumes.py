@@ -352,7 +352,7 @@ def correct_seams(
     """Return a volume whose replaced voxels differ from their neighbours as in the places that they are copied from.
 
     The values x minimise ``sum((x[q] - x[p] - g[p, q]) ** 2) + weight * sum((x - composite) ** 2)`` over pairs of neighbours.
-    The difference g is that of the pair in the exemplar.
+    The requested difference g of a pair is its difference at the source.
     """
     box = find_box(new, 1)
     first = np.array([s.start for s in box])

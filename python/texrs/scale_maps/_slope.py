@@ -163,7 +163,7 @@ class Slope:
             Requested scales.
         other : Slope, optional
             Plane along whose slope the scales grow. Lines converge to the vanishing point of this other plane, and the
-            upright direction is that of the present plane. Default: each point is seen as if straight ahead, along the
+            present plane gives the upright direction. Default: each point is seen as if straight ahead, along the
             slope of the present plane.
         foreshortened : float
             Power of the foreshortening of this plane to apply. Default: 1.

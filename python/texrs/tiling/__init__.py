@@ -72,7 +72,7 @@ LARGER = "texrs.CornerTiles creates an unbounded design in parts"
 MOST = 7
 """Maximum overlap that the search tries, in 1/16 of the side."""
 REGULAR, DEAR = 1.0, 0.5
-"""Factor between the costs of the seams of a cover and of an overlap up to which the cover is preferred.
+"""Ratio of the seam costs of a cover and of an overlap below which the cover is preferred.
 
 The first value is for elements on a lattice. The second value is for covers that are unlikely to fit, because elements
 are large or the side is not a multiple of their period.

@@ -11,7 +11,7 @@ from texrs._typing import Bools, Floats
 from texrs.kernels.seam import Cut, Strip, cut_strips
 
 MORE = 8
-"""Divisor of the side. A strip for a closed seam is extended by this part of the side at each end."""
+"""A strip for a closed seam is extended at each end by the side divided by this number."""
 FLAT = 0.05
 """Value that the kernel adds to a gradient before it divides a cost by it, in units of the guide."""
 

@@ -31,7 +31,7 @@ LOSS = 1.5
 An overlap of the whole side would add this multiple of the cost of its seam.
 """
 COVERED = 1.6
-"""Factor between the costs of the seams of a cover and of an overlap up to which the cover is preferred.
+"""Ratio of the seam costs of a cover and of an overlap below which the cover is preferred.
 
 A cover needs two seams, but keeps the size.
 """
@@ -107,7 +107,7 @@ class Choice:
     period: int = 0
     """Length of a result with a cover, in lines. 0 if covers are not allowed."""
     covered: float = COVERED
-    """Factor between the costs of the seams of a cover and of an overlap up to which the cover is preferred."""
+    """Ratio of the seam costs of a cover and of an overlap below which the cover is preferred."""
     loss: float = LOSS
     """Weight of the lost length in the price of a joint."""
 

@@ -47,7 +47,7 @@ class Comparison:
     isolated : tuple of float
         Fraction of the points that differ from the median of their neighbourhood (`speckle`).
     values : float
-        Mean Wasserstein distance of the lightness of the output's slices to that of the exemplar, in [0, 1].
+        Mean Wasserstein distance between the lightness of the output's slices and of the exemplar, in [0, 1].
     seams : (2,) float64
         Minimum and maximum change between adjacent planes of the output, divided by the median change along the same
         axis.
@@ -96,7 +96,7 @@ class Comparison:
 
     @property
     def frequency_ratio(self) -> float:
-        """Frequency of the output divided by that of the exemplar: 1 for equally fine, 0.5 for twice as coarse."""
+        """Frequency of the output divided by the frequency of the exemplar: 1 for equally fine, 0.5 for twice as coarse."""
         return self.frequency[1] / self.frequency[0]
 
     @property

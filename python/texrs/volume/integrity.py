@@ -23,7 +23,7 @@ WHOLE, CRUMB = 0.9, 0.3
 LEAST = 40
 """Minimum number of points of a part or element that is measured."""
 SECOND = 0.12
-"""Minimum fraction of other colours for a part to count as one of several colours."""
+"""Minimum fraction of other colours in a part that has several colours."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Statistics of the materials of an image or a volume: colour classes, volume fractions, and connected components.
 
 Values are scaled to [0, 1] by the range of their dtype. Floats outside [0, 1] are scaled by their own range (in
-`compare`, by that of the exemplar).
+`compare`, by the range of the exemplar).
 """
 
 from __future__ import annotations
