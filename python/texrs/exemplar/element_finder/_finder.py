@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from texrs._arrays import as_image, as_rgb, as_seed, to_unit
-from texrs._typing import Bools, Floats, Labels
+from texrs._cache import Cache, content_hash
+from texrs._progress import answering, ask, listen
+from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._layout_class import LAYOUTS, Arrangement, read_layout
 from texrs.exemplar.element_finder._outline_cuts import enlarge, refine_outlines
@@ -100,8 +103,14 @@ class FoundElements:
         return np.asarray(self.labels == number + 1)
 
 
-def find_elements(image: object, *, seed: int = 0) -> FoundElements:
-    """Find the elements that an image repeats, and how they lie.
+_FOUND: Cache[bytes, FoundElements] = Cache(1 << 26, lambda found: found.labels.nbytes)
+"""Recent results, by the content of the image and the seed."""
+
+
+def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | None = None) -> FoundElements:
+    """Find the elements that an image repeats, and their layout.
+
+    Recent results are cached by the content of the image.
 
     Parameters
     ----------
@@ -109,11 +118,19 @@ def find_elements(image: object, *, seed: int = 0) -> FoundElements:
         Shape (H, W) or (H, W, C), any dtype. The first three channels are colours.
     seed : int
         Seed of the pixels that the code words are learned from. Default: 0.
+    progress : callable or True, optional
+        Function that is called as ``progress("elements", share)`` during the work. An exception from it stops the
+        work. True shows a progress bar.
 
     Returns
     -------
     FoundElements
-        ``labels``, ``elements``, ``layout`` and their confidences.
+        ``labels``, ``elements``, ``layout`` and their confidences. The labels are read-only.
+
+    Raises
+    ------
+    InvalidInput
+        If the image or the seed has another type, shape or range.
 
     Examples
     --------
@@ -124,18 +141,30 @@ def find_elements(image: object, *, seed: int = 0) -> FoundElements:
     'separate'
 
     """
-    pixels = as_image(image, "image")
-    seed = as_seed(seed)
+    pixels, seed, progress = as_image(image, "image"), as_seed(seed), listen(progress)
+    watch = progress or (lambda stage, share: ask())
+    key = content_hash(pixels, seed)
+    found = _FOUND.get_or_make(key, lambda: analyse(pixels, seed, lambda share: watch("elements", share)))
+    watch("elements", 1.0)
+    return found
+
+
+def analyse(pixels: Array, seed: int, watch: Callable[[float], object]) -> FoundElements:
+    """Find the elements of an image. `watch` is called with the finished share of the work."""
     rgb = as_rgb(to_unit(pixels))
     small = reduce(rgb)
     if min(small.shape[:2]) < LEAST or float(np.ptp(small)) == 0:
         return report_nothing(rgb.shape[0], rgb.shape[1])
-    contours = find_contours(small, seed)
-    choice = choose(contours)
+    with answering(watch, 0.0):
+        contours = find_contours(small, seed)
+    with answering(watch, 0.2):
+        choice = choose(contours)
     if choice is None:
         return report_nothing(rgb.shape[0], rgb.shape[1])
     layouts = read_layout(choice, contours)
-    labels = refine_outlines(choice.labels, contours, rgb)
+    with answering(watch, 0.8):
+        labels = refine_outlines(choice.labels, contours, rgb)
+    labels.flags.writeable = False
     layout = max(LAYOUTS, key=lambda name: layouts[name])
     overlaps = find_overlaps(enlarge(labels, contours.words.shape)) if layout == "heap" else ()
     elements = measure_elements(labels, choice, overlaps)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from texrs import _rust
+from texrs._progress import ask
 from texrs._typing import Floats
 from texrs.exemplar.element_finder._candidates import Candidates, Leaves, make_candidates, make_leaves
 from texrs.exemplar.element_finder._contour_strength import Contours
@@ -38,8 +39,8 @@ OTHERS = 48
 """Number of elements that each candidate is compared with."""
 ROUNDS = 4
 """Largest number of rounds of the consensus."""
-FEWEST = 3
-"""Least number of elements of a choice."""
+FEWEST = 3, 1
+"""Least number of elements of a choice. The second value is used if an image has no choice with the first one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,16 +77,17 @@ class Choice:
 
 def choose(contours: Contours) -> Choice | None:
     """Return the best choice over all readings of lines, or None without elements."""
-    best = None
-    for lines in ("none", "dark", "light"):
-        found = choose_reading(contours, lines)
-        if found is not None and (best is None or found.value > best.value):
-            best = found
-    return best
+    for fewest in FEWEST:
+        found = [choose_reading(contours, lines, fewest) for lines in ("none", "dark", "light")]
+        best = max((one for one in found if one is not None), key=lambda one: one.value, default=None)
+        if best is not None:
+            return best
+    return None
 
 
-def choose_reading(contours: Contours, lines: str) -> Choice | None:
+def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None:
     """Return the best choice if lines of one kind are contours."""
+    ask()
     # Merge the leaves, and keep candidates with a sufficient outline.
     strength, level = read_strength(contours, lines)
     leaves = make_leaves(strength, contours, 0.5 * level)
@@ -94,7 +96,7 @@ def choose_reading(contours: Contours, lines: str) -> Choice | None:
     candidates = make_candidates(leaves, least, most)
     base = measure_quality(candidates.features, level)
     keep = np.flatnonzero(base > FLOOR - 0.12)
-    if len(keep) < 5:
+    if len(keep) < fewest:
         return None
     candidates, base = candidates.pick(keep), base[keep]
     f = candidates.features
@@ -103,19 +105,22 @@ def choose_reading(contours: Contours, lines: str) -> Choice | None:
     sizes = np.log(f["area"] / visible)
     best: tuple[float, NDArray[np.bool_], Values] | None = None
     seen: set[bytes] = set()
-    for chosen, quality in choose_sizes(candidates, base, sizes, np.arange(np.log(least * 1.5), np.log(most), 0.35)):
+    for chosen, quality in choose_sizes(
+        candidates, base, sizes, np.arange(np.log(least * 1.5), np.log(most), 0.35), fewest
+    ):
         # Repeat the consensus and the choice until a set occurs again.
         for _ in range(ROUNDS):
             if chosen.tobytes() in seen:
                 break
             seen.add(chosen.tobytes())
+            ask()
             extra = measure_consensus(candidates, chosen, quality, leaves)
             weights = np.sqrt(f["area"][chosen]) * np.maximum(quality[chosen] - FLOOR, 0.01)
             away = measure_gap(sizes, weighted_median(sizes[chosen], weights), f["frame"])
             spread = np.clip(1.5 * np.median(away[chosen]), 0.3, 0.55)
             quality = base + extra - SIZE * np.minimum(away / (2.0 * spread), FAR) ** 2
             again = select(candidates, quality, 6)
-            if again.sum() < FEWEST:
+            if again.sum() < fewest:
                 break
             chosen = again
             value = measure_value(candidates, quality, chosen)
@@ -144,14 +149,14 @@ def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
 
 
 def choose_sizes(
-    candidates: Candidates, base: Values, sizes: Values, ladder: Values
+    candidates: Candidates, base: Values, sizes: Values, ladder: Values, fewest: int
 ) -> list[tuple[NDArray[np.bool_], Values]]:
     """Return the choices of the best usual sizes, and the qualities under each."""
     found = []
     for size in ladder:
         quality = base - SIZE * np.minimum(measure_gap(sizes, size, candidates.features["frame"]) / 1.2, 1.5) ** 2
         chosen = select(candidates, quality, 2)
-        if chosen.sum() >= FEWEST:
+        if chosen.sum() >= fewest:
             found.append((measure_value(candidates, quality, chosen), chosen, quality))
     found.sort(key=lambda one: -one[0])
     return [(chosen, quality) for _, chosen, quality in found[:STARTS]]
