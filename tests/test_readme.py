@@ -49,7 +49,7 @@ def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hole = np.zeros((128, 128), np.uint8)
     hole[48:80, 44:70] = 255
     ground = np.full((128, 128), 255, np.uint8)
-    for name, mask in (("hole", hole), ("thing", hole), ("ground", ground)):
+    for name, mask in (("hole", hole), ("object", hole), ("ground", ground)):
         io.write(folder / f"{name}.png", mask)
     samples.particles((32, 36, 40)).image[..., 0].astype("<u2").tofile(folder / "scan.raw")
     pebbles = samples.pebbles((96, 96)).image
