@@ -6,15 +6,12 @@ from collections.abc import Callable
 import numpy as np
 
 import texrs
-from layout import FOLDER, beside, label
+from layout import FOLDER, INPUT, RESULT, Panel, write_panels
 from texrs import samples, volume
 from texrs.painting import texture_mesh
 
 HEIGHT = 240
 """Height of the highest picture of a row, in pixels; the others are at the same scale."""
-Panel = tuple[np.ndarray, str, bool]
-"""A picture, its label, and whether it is an input."""
-INPUT, RESULT = True, False
 
 
 def tile() -> list[Panel]:
@@ -252,14 +249,9 @@ GUIDES: tuple[Callable[[], list[Panel]], ...] = (
 def main() -> None:
     """Write the pictures of the guides that are named, or of all."""
     folder = FOLDER / "guides"
-    folder.mkdir(parents=True, exist_ok=True)
     for make in GUIDES:
         if not sys.argv[1:] or make.__name__ in sys.argv[1:]:
-            panels = make()
-            highest = max(image.shape[0] for image, _, _ in panels)
-            shown = beside([label(i, text, HEIGHT * i.shape[0] // highest, given=given) for i, text, given in panels])
-            texrs.io.write(folder / f"{make.__name__.replace('_', '-')}.jpg", shown)
-            print(make.__name__, shown.shape, flush=True)
+            write_panels(folder / f"{make.__name__.replace('_', '-')}.jpg", [make()], HEIGHT)
 
 
 if __name__ == "__main__":

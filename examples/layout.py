@@ -1,5 +1,7 @@
-"""Pictures set side by side and below each other, for the pictures that the README shows."""
+"""Pictures set side by side and below each other, for the pictures that the README and the documentation show."""
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +12,15 @@ from texrs.synthesis import preview
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 GAP = 8
-STRIP = 26
-"""Height of the strip above an image that holds its label, in pixels."""
-INPUT, RESULT = (196, 98, 16), (40, 40, 40)
+FONT = 16
+"""Smallest size of labels, in pixels."""
+COLUMN = 60
+"""Width of a picture divided by the size of its labels. The text column shows wide pictures at a smaller scale."""
+GIVEN, MADE = (196, 98, 16), (40, 40, 40)
 """Colours of the labels of inputs and of results."""
+INPUT, RESULT = True, False
+Panel = tuple[np.ndarray, str, bool]
+"""A picture, its label, and whether it is an input."""
 
 
 def rgb(picture: np.ndarray, height: int | None = None) -> np.ndarray:
@@ -45,12 +52,41 @@ def below(rows: list[np.ndarray]) -> np.ndarray:
     return np.concatenate(cells, axis=0)[:-GAP]
 
 
-def label(picture: np.ndarray, text: str, height: int, *, given: bool = False) -> np.ndarray:
+def label(picture: np.ndarray, text: str, height: int, *, given: bool = False, font: int = FONT) -> np.ndarray:
     """Return an image with its label on a strip above it; an input is framed and labelled in orange."""
-    shown, colour = rgb(picture, height), INPUT if given else RESULT
+    shown, colour = rgb(picture, height), GIVEN if given else MADE
     if given:
         for edge in (np.s_[:3], np.s_[-3:], np.s_[:, :3], np.s_[:, -3:]):
             shown[edge] = colour
-    strip = Image.new("RGB", (shown.shape[1], STRIP), "white")
-    ImageDraw.Draw(strip).text((2, 3), text, fill=colour, font=ImageFont.load_default(16))
+    strip = Image.new("RGB", (shown.shape[1], font * 13 // 8), "white")
+    ImageDraw.Draw(strip).text((2, font // 5), text, fill=colour, font=ImageFont.load_default(font))
     return np.concatenate([np.asarray(strip), shown])
+
+
+def write_panels(file: Path, rows: Sequence[Sequence[Panel]], height: int) -> None:
+    """Write rows of labelled panels to a JPEG file. The highest panel of each row has a height in pixels.
+
+    The comment of the file contains the boxes of the panels (left, top, right, bottom). `docs/finish.py` arranges the
+    panels for phones by these boxes.
+    """
+    scales = [height / max(len(image) for image, _, _ in row) for row in rows]
+
+    def draw(font: int) -> list[list[np.ndarray]]:
+        return [
+            [label(image, text, round(scale * len(image)), given=given, font=font) for image, text, given in row]
+            for row, scale in zip(rows, scales, strict=True)
+        ]
+
+    wide = max(beside(row).shape[1] for row in draw(FONT))
+    panels = draw(max(FONT, wide // COLUMN))
+    boxes, top = [], 0
+    for row in panels:
+        left = 0
+        for panel in row:
+            boxes.append((left, top, left + panel.shape[1], top + panel.shape[0]))
+            left += panel.shape[1] + GAP
+        top += max(len(panel) for panel in row) + GAP
+    shown = below([beside(row) for row in panels])
+    file.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(shown).save(file, quality=88, subsampling=0, comment=json.dumps({"panels": boxes}))
+    print(file.name, shown.shape, flush=True)

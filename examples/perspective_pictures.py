@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 import texrs
-from layout import FOLDER, below, beside
+from layout import FOLDER, INPUT, RESULT, Panel, write_panels
 from texrs import io, samples, scale_maps
 
 SIZE = 256
@@ -29,21 +29,27 @@ def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.exp(m).astype(np.float32) for name, m in maps.items()}
 
 
-def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
+def rows_of(image: np.ndarray, scale: np.ndarray) -> list[list[Panel]]:
     """Return what is grown from an image to each target, and a hole filled three ways."""
-    grown = [image, scale_maps.picture(scale)]
-    for target in targets(scale).values():
-        grown.append(texrs.perspective(image, scale, SIZE, target=target, seed=1).image)
+    grown: list[Panel] = [(image, "input", INPUT), (scale_maps.picture(scale), "its scale map", RESULT)]
+    for name, target in targets(scale).items():
+        made = texrs.perspective(image, scale, len(image), target=target, seed=1).image
+        grown.append((made, f"result: a {name}", RESULT))
     rows, columns = image.shape[:2]
     hole = np.zeros((rows, columns), bool)
     hole[rows // 3 : rows // 3 * 2, columns // 3 : columns // 3 * 2] = True
-    filled = [np.where(hole[..., np.newaxis], 128, image).astype(np.uint8)]
-    for options in ({"scale_map": scale}, {"scale_map": scale, "method": "optimise"}, {}):
-        filled.append(texrs.inpaint(image, hole, seed=1, **options).image)
-    return [beside(grown), beside(filled)]
+    ways: dict[str, dict[str, object]] = {
+        "patches": {"scale_map": scale},
+        "optimised": {"scale_map": scale, "method": "optimise"},
+        "without the map": {},
+    }
+    filled: list[Panel] = [(np.where(hole[..., np.newaxis], 128, image).astype(np.uint8), "input: a hole", INPUT)]
+    for text, options in ways.items():
+        filled.append((texrs.inpaint(image, hole, seed=1, **options).image, text, RESULT))  # type: ignore[arg-type]
+    return [grown, filled]
 
 
-def surfaces() -> list[np.ndarray]:
+def surfaces() -> list[list[Panel]]:
     """Return bricks around a column and a ball, on another plane and in circles; and other textures turned by fields."""
     bricks = samples.load("bricks").image
     y, x = np.mgrid[:SIZE, :SIZE] / ((SIZE - 1) / 2) - 1
@@ -60,28 +66,37 @@ def surfaces() -> list[np.ndarray]:
     rolled = lay("bricks", target=ball)
     floor = samples.tilted_discs((SIZE, SIZE)).image
     seen = texrs.planes.find(floor, fov=37)
-    laid = [
-        bricks,
-        lay("bricks", target=column),
-        np.where(inside[..., None], rolled, 255).astype(np.uint8),
-        lay("bricks", target="plane:slant=45,tilt=30,fov=50"),
-        lay("bricks", direction=around - 90),
-    ]
     larger = (0.4 + 0.6 * np.hypot(x, y)).astype(np.float32)
-    turned = [
-        lay("scales", direction=around + 90, target=larger),
-        lay("weave", direction=wave),
-        lay("bark", direction=wave),
-        floor,
-        texrs.perspective(floor, seen, SIZE, target="plane:slant=40,tilt=20,fov=50", direction=30.0, seed=1).image,
+    return [
+        [
+            (bricks, "input", INPUT),
+            (lay("bricks", target=column), "around a column", RESULT),
+            (np.where(inside[..., None], rolled, 255).astype(np.uint8), "around a ball", RESULT),
+            (lay("bricks", target="plane:slant=45,tilt=30,fov=50"), "on a plane", RESULT),
+        ],
+        [
+            (lay("bricks", direction=around - 90), "in circles", RESULT),
+            (lay("scales", direction=around + 90, target=larger), "growing in circles", RESULT),
+            (lay("weave", direction=wave), "along a wave", RESULT),
+            (lay("bark", direction=wave), "along a wave", RESULT),
+        ],
+        [
+            (floor, "input", INPUT),
+            (
+                texrs.perspective(
+                    floor, seen, SIZE, target="plane:slant=40,tilt=20,fov=50", direction=30.0, seed=1
+                ).image,
+                "on another plane",
+                RESULT,
+            ),
+        ],
     ]
-    return [beside(laid), beside(turned)]
 
 
 def main() -> None:
     """Write the pictures."""
     named = sys.argv[1:]
-    rows = []
+    rows: list[list[Panel]] = []
     if named:
         for path, truth in zip(named[::2], named[1::2], strict=True):
             image = io.read(path)[..., :3]
@@ -89,10 +104,9 @@ def main() -> None:
     else:
         floor = samples.tilted_discs((224, 224))
         rows += rows_of(floor.image, np.asarray(floor.scale_map, np.float32))
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    io.write(FOLDER / "perspective.jpg", below(rows))
+    write_panels(FOLDER / "perspective.jpg", rows, 224)
     if not named:
-        io.write(FOLDER / "surfaces.jpg", below(surfaces()))
+        write_panels(FOLDER / "surfaces.jpg", surfaces(), 240)
 
 
 if __name__ == "__main__":

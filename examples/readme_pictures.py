@@ -3,14 +3,14 @@
 import numpy as np
 
 import texrs
-from layout import FOLDER, below, beside, label
+from layout import FOLDER, INPUT, RESULT, Panel, write_panels
 from texrs import fields, samples, volume
 from texrs.elements import ElementAnalysis
 
 HEIGHT = 200
 
 
-def four() -> np.ndarray:
+def four() -> list[list[Panel]]:
     """Show each system once: its inputs, labelled as such, and its result."""
     stones = samples.pebbles((192, 192)).image
     dots, net = (ElementAnalysis.of_sample(samples.load(name, size=(192, 192))) for name in ("dots", "net"))
@@ -22,47 +22,49 @@ def four() -> np.ndarray:
     large = texrs.design(stones, (192, 384), seed=3).image
     spliced = texrs.splice(dots, net, seed=1).image
     grown = texrs.perspective(floor.image, scale, wave.shape, target=wave, seed=1).image
-    rows = [
+    return [
         [
-            label(stones, "input", HEIGHT, given=True),
-            label(large, "texrs design", HEIGHT),
-            label(volume.render_block(wood, 200), "input", HEIGHT, given=True),
-            label(volume.render_block(rings, 200), "texrs solid", HEIGHT),
+            (stones, "input", INPUT),
+            (large, "texrs design", RESULT),
+            (volume.render_block(wood, 192), "input", INPUT),
+            (volume.render_block(rings, 192), "texrs solid", RESULT),
         ],
         [
-            label(dots.image, "input", HEIGHT, given=True),
-            label(net.image, "input: the layout", HEIGHT, given=True),
-            label(spliced, "texrs splice", HEIGHT),
-            label(floor.image, "input", HEIGHT, given=True),
-            label(grown, "texrs perspective", HEIGHT),
+            (dots.image, "input", INPUT),
+            (net.image, "input: the layout", INPUT),
+            (spliced, "texrs splice", RESULT),
+            (floor.image, "input", INPUT),
+            (grown, "texrs perspective", RESULT),
         ],
     ]
-    return below([beside(row) for row in rows])
+
+
+def design() -> list[list[Panel]]:
+    """Show the stages of DESIGN."""
+    flowers = samples.leaves_and_flowers((192, 192)).image
+    made = texrs.design(flowers, (384, 800), seed=3, motion="move")
+    stages = {"deformed": "elements moved", "holes": "holes", "completed": "holes filled"}
+    first: list[Panel] = [
+        (flowers, "input", INPUT),
+        *((made.stages[name], text, RESULT) for name, text in stages.items()),
+    ]
+    return [first, [(made.image[:192], "a part of the result", RESULT)]]
+
+
+def show_samples() -> list[list[Panel]]:
+    """Show all generated samples, four in a row."""
+    shown = []
+    for name in samples.names():
+        image = samples.load(name).image
+        shown.append((image if image.ndim == 3 else volume.render_block(image, 256), name, RESULT))
+    return [shown[i : i + 4] for i in range(0, len(shown), 4)]
 
 
 def main() -> None:
     """Write all pictures."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    texrs.io.write(FOLDER / "four.jpg", four())
-    flowers = texrs.samples.leaves_and_flowers((192, 192)).image
-    made = texrs.design(flowers, (384, 768), seed=3, motion="move")
-    left = below(
-        [beside([flowers, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
-    )
-    texrs.io.write(FOLDER / "design.jpg", beside([left, made.image], 384))
-    names = ("pebbles", "leaves_and_flowers", "beans", "dots", "grit", "bark")
-    rows = []
-    for first in range(0, len(names), 2):
-        pair = []
-        for name in names[first : first + 2]:
-            example = texrs.samples.load(name, size=(192, 192)).image
-            framed = np.pad(example, ((0, 128), (0, 0), (0, 0)), constant_values=255)
-            pair += [framed, texrs.design(example, (320, 320), seed=1).image]
-        rows.append(beside(pair, 200))
-    texrs.io.write(FOLDER / "gallery.jpg", below(rows))
-    planar = [n for n in texrs.samples.names() if texrs.samples.load(n).image.ndim == 3]
-    tiles = [texrs.samples.load(n).image for n in planar]
-    texrs.io.write(FOLDER / "samples.jpg", below([beside(tiles[i : i + 6], 160) for i in range(0, len(tiles) - 5, 6)]))
+    write_panels(FOLDER / "four.jpg", four(), HEIGHT)
+    write_panels(FOLDER / "design.jpg", design(), HEIGHT)
+    write_panels(FOLDER / "samples.jpg", show_samples(), HEIGHT)
 
 
 if __name__ == "__main__":

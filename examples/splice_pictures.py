@@ -3,7 +3,7 @@
 import numpy as np
 
 import texrs
-from layout import FOLDER, below, beside
+from layout import FOLDER, INPUT, RESULT, Panel, write_panels
 from texrs import samples
 from texrs.elements import ElementAnalysis
 
@@ -11,9 +11,9 @@ SIDE = 192
 
 SPLICES = (("dots", "net"), ("dots", "bricks"), ("pebbles", "dots"))
 EDITS = (
-    ("dots", "regularise"),
-    ("dots", {"op": "scale", "factor": 1.25}),
-    ("bricks", {"op": "rows", "by": 8}),
+    ("dots", "regularise", "regularised"),
+    ("dots", {"op": "scale", "factor": 1.25}, "scaled"),
+    ("bricks", {"op": "rows", "by": 8}, "rows moved"),
 )
 
 
@@ -29,27 +29,32 @@ def to_colours(image: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Write the picture."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for (a, b), (c, edit) in zip(SPLICES, EDITS, strict=True):
+    rows: list[list[Panel]] = []
+    for (a, b), (c, edit, text) in zip(SPLICES, EDITS, strict=True):
         elements, layout, own = entry(a), entry(b), entry(c)
-        spliced = beside([elements.image, layout.image, texrs.splice(elements, layout, seed=1).image])
-        edited = beside([own.image, texrs.self_splice(own, edit, seed=1).image])
-        rows.append(beside([spliced, edited]))
+        rows.append(
+            [
+                (elements.image, "input: elements", INPUT),
+                (layout.image, "input: layout", INPUT),
+                (texrs.splice(elements, layout, seed=1).image, "splice", RESULT),
+                (own.image, "input", INPUT),
+                (texrs.self_splice(own, edit, seed=1).image, text, RESULT),
+            ]
+        )
     # Layouts that are drawn: courses of two heights, and a lattice.
     wall, buttons = entry("bricks"), entry("dots")
     drawn = texrs.layouts.courses(SIDE, [24, 40], 60, shift=1 / 3, vary=0.4, seed=2)
     oblique = texrs.layouts.lattice(SIDE, (0, 40), (34, 14))
-    courses = texrs.splice(wall, drawn, layout_scale=1, seed=1).image
-    row = [
-        wall.image,
-        drawn.image,
-        courses,
-        oblique.image,
-        texrs.splice(buttons, oblique, layout_scale=1, seed=1).image,
-    ]
-    rows.append(beside([to_colours(i) for i in row]))
-    texrs.io.write(FOLDER / "splice.jpg", below(rows))
+    rows.append(
+        [
+            (wall.image, "input: elements", INPUT),
+            (to_colours(drawn.image), "a drawn layout", INPUT),
+            (texrs.splice(wall, drawn, layout_scale=1, seed=1).image, "splice", RESULT),
+            (to_colours(oblique.image), "a drawn layout", INPUT),
+            (texrs.splice(buttons, oblique, layout_scale=1, seed=1).image, "splice of buttons", RESULT),
+        ]
+    )
+    write_panels(FOLDER / "splice.jpg", rows, SIDE)
 
 
 if __name__ == "__main__":
