@@ -1,14 +1,16 @@
 """Optimise the built pages: give images their sizes and smaller copies, and remove unused scripts and icons.
 
-Each image gets copies in WebP with the widths of a phone and of the text column, and browsers choose among them. A
-drawing also has a version for phones. All images of a page except the first one are loaded when they come near the
-window. The theme loads the search index on every page, and icons both as a font and as a script, with rules for two
-thousand icons. Only the search page keeps the search index. The font stays, and only rules of used icons are kept.
-Marks of docutils and of the gallery are corrected for screen readers: links without text, and lists without items.
+Each image gets copies in WebP with the widths of a phone and of the text column, and browsers choose among them.
+Drawings, and pictures of several panels, also have a version for phones. All images of a page except the first one are
+loaded when they come near the window. The theme loads the search index on every page, and icons both as a font and as a
+script, with rules for two thousand icons. Only the search page keeps the search index. The font stays, and only rules
+of used icons are kept. Marks of docutils and of the gallery are corrected for screen readers: links without text, and
+lists without items.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from functools import cache
@@ -24,7 +26,13 @@ QUALITY = 74
 SIZES = "(max-width: 720px) 94vw, (max-width: 1200px) 66vw, 820px"
 THUMBNAIL = "16rem"
 NARROW = "(max-width: 720px)"
-"""Windows that show the narrow version of a drawing, whose panels are below each other."""
+"""Windows that show the narrow version of a drawing or picture, with few panels in a row."""
+PHONE = 520
+"""Width of the narrow version of a picture, in pixels: two usual panels in a row."""
+LONG = 13
+"""Length of code that can be broken in a table, in characters."""
+GAP = 8
+"""Space between the panels of a narrow version, in pixels."""
 
 
 def finish(app: object, error: Exception | None) -> None:
@@ -40,7 +48,7 @@ def finish(app: object, error: Exception | None) -> None:
                         "<body>", '<body class="beside">', 1
                     )
                 drawings = Path(app.srcdir) / "generated" / "drawings"  # type: ignore[attr-defined]
-                made = name_parts(rewrite(drop_scripts(text, page.name), page.parent, drawings))
+                made = break_code(name_parts(rewrite(drop_scripts(text, page.name), page.parent, drawings)))
                 icons.update(re.findall(r"\bfa-[a-z0-9-]+", made))
                 page.write_text(made, encoding="utf-8")
         for script in (root / "_static" / "scripts").glob("pydata-sphinx-theme.js"):
@@ -65,6 +73,21 @@ def name_parts(text: str) -> str:
         text,
     )
     return text.replace(' role="doc-biblioentry"', ' role="listitem"')
+
+
+def break_code(text: str) -> str:
+    """Mark places after punctuation where long code in table cells can be broken, so that tables fit a phone."""
+
+    def mark(word: re.Match[str]) -> str:
+        return re.sub(
+            r"(?:(?<=[A-Za-z\])])(?:[._/=,(:]|-(?!-))|(?<=WIDTH|EIGHT)x)(?=[\w&])", r"\g<0><wbr>", word.group(0)
+        )
+
+    def mark_words(cell: re.Match[str]) -> str:
+        return re.sub(rf'(?<=<span class="pre">)[^<]{{{LONG},}}(?=</span>)', mark, cell.group(0))
+
+    text = re.sub(r'<span class="pre">(?=(?:&#?\w+;|[\'(\[])*-)', '<span class="pre option">', text)
+    return re.sub(r"<td\b.*?</td>", mark_words, text, flags=re.DOTALL)
 
 
 def drop_icons(sheet: str, used: set[str]) -> str:
@@ -96,10 +119,14 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
         added, before, after = "", "", ""
         near = source.group(1).rpartition("/")[0]
         width, height, copies = make_copies(file)
-        # Drawings have a version for phones, which the browser chooses by the width of the window.
-        narrow = file.with_stem(f"{file.stem}-narrow")
-        if (drawings / narrow.name).exists():
+        # Drawings and pictures have a version for phones, which the browser chooses by the width of the window.
+        narrow = file.with_name(f"{file.stem}-narrow.png")
+        if file.suffix == ".png" and (drawings / narrow.name).exists():
             shutil.copyfile(drawings / narrow.name, narrow)
+            is_narrow = True
+        else:
+            is_narrow = wrap_panels(file, narrow)
+        if is_narrow:
             wide, high, smaller = make_copies(narrow)
             before = (
                 f'<picture><source media="{NARROW}" srcset="{list_copies(near, smaller)}" sizes="94vw"'
@@ -141,3 +168,32 @@ def make_copies(file: Path) -> tuple[int, int, list[tuple[str, int]]]:
             if copy.stat().st_size < file.stat().st_size:
                 copies.append((copy.name, wide))
     return width, height, copies
+
+
+def wrap_panels(file: Path, narrow: Path) -> bool:
+    """Arrange the panels of a picture in rows for a phone. Return False if the picture does not contain their boxes."""
+    with Image.open(file) as opened:
+        comment = opened.info.get("comment", b"")
+        if not comment.startswith(b'{"panels"'):
+            return False
+        picture = opened.convert("RGB")
+    rows: list[list[Image.Image]] = []
+    for box in json.loads(comment)["panels"]:
+        panel = picture.crop(tuple(box))
+        if panel.width > PHONE:
+            panel = panel.resize((PHONE, round(panel.height * PHONE / panel.width)), Image.Resampling.LANCZOS)
+        if not rows or sum(each.width + GAP for each in rows[-1]) + panel.width > PHONE:
+            rows.append([])
+        rows[-1].append(panel)
+    high = sum(max(each.height for each in row) + GAP for row in rows) - GAP
+    wide = max(sum(each.width + GAP for each in row) for row in rows) - GAP
+    shown = Image.new("RGB", (wide, high), "white")
+    top = 0
+    for row in rows:
+        left = 0
+        for panel in row:
+            shown.paste(panel, (left, top))
+            left += panel.width + GAP
+        top += max(each.height for each in row) + GAP
+    shown.save(narrow)
+    return True
