@@ -56,7 +56,7 @@ html_theme_options = {
     "show_toc_level": 2,
     # The reference has a page for each function.
     "collapse_navigation": True,
-    "header_links_before_dropdown": 5,
+    "header_links_before_dropdown": 6,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -40,6 +40,11 @@ def show(panel: Any, image: Any, title: str, **options: Any) -> None:
     panel.set_yticks([])
 
 
+def picture_scale(scale: Any) -> Any:
+    """Show a scale map with its key. It is enlarged, because the digits of the key have a fixed size."""
+    return scale_maps.picture(np.repeat(np.repeat(scale, 2, axis=0), 2, axis=1))
+
+
 def colour_places(coordinates: Any, shape: tuple[int, ...]) -> Any:
     """Show positions in an example as colours: red increases downwards, green increases to the right."""
     red, green = (coordinates[..., axis] / (shape[axis] - 1) for axis in (0, 1))
@@ -76,7 +81,7 @@ def source_map() -> Any:
         )
     show(panels[2], colour_places(source.coordinates, sample.image.shape), "the source map, shown as colours")
     labels = source.render(sample.labels, interpolation="nearest")
-    show(panels[3], volume.label_to_color(labels), "labels looked up through the source map")
+    show(panels[3], volume.label_to_color(labels), "labels of the result, looked up")
     # Draw the colours of all positions in the example as a key.
     key = panels[2].inset_axes((0.02, 0.03, 0.22, 0.3))
     place = np.stack(np.meshgrid(range(112), range(112), indexing="ij"), axis=-1)
@@ -147,7 +152,7 @@ def scale_map() -> Any:
     for row in (20, 60, 105, 160):
         for column in (40, 96, 152):
             panels[1].add_patch(plt.Circle((column, row), 10 * scale[row, column], fill=False, ec="white", lw=2))
-    show(panels[2], scale_maps.picture(scale), "its scale map")
+    show(panels[2], picture_scale(scale), "its scale map")
     # Grow the floor again for a map that is large in the middle, within the range of its own sizes.
     at = (np.arange(192) + 0.5) / 192
     far = np.hypot(at - 0.5, at[:, np.newaxis] - 0.5) / 0.7
@@ -279,7 +284,7 @@ def perspective() -> tuple[Any, Measured]:
         for name, options in ((PRINTED, {"method": "paper"}), (OURS, {}))
     }
     figures = {name: evaluate(floor.image, each.source_map) for name, each in made.items()}
-    given = [("the example", floor.image), ("the target scale map", scale_maps.picture(turned))]
+    given = [("the example", floor.image), ("the target scale map", picture_scale(turned))]
     return compare(given, [(n, m.image) for n, m in made.items()]), tell(
         figures, {n: JUDGED[n] for n in ("torn", "broken")}
     )

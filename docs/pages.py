@@ -131,9 +131,13 @@ INSTALLED = """
 `benches/install_table.py` measured these numbers on {date}, in an empty environment of Python {python}. The wheel of
 texrs has {wheel} MB. Times are processor seconds. MB is the growth of the environment, including dependencies.
 
-| program | packages | MB | time of installation, s | time of the first image, s | first image |
-|---|---|---|---|---|---|
+| program | packages | MB | installation, s | first image, s |
+|---|---|---|---|---|
 {rows}
+
+The first image of each program:
+
+{images}
 """
 
 
@@ -144,11 +148,12 @@ def tabulate_installs(file: Path) -> str:
     if not file.exists():
         return ""
     found = json.loads(file.read_text(encoding="utf-8"))
-    rows = []
+    rows, images = [], []
     for name, each in found.pop("rows").items():
-        figures = [str(each.get(key, "")) for key in ("packages", "megabytes", "install", "picture")]
-        rows.append(f"| {name} | {' | '.join(figures)} | {each.get('wrong', each['shows'])} |")
-    return INSTALLED.format(rows="\n".join(rows), **found)
+        figures = [str(each.get(key, "none")) for key in ("packages", "megabytes", "install", "picture")]
+        rows.append(f"| {name} | {' | '.join(figures)} |")
+        images.append(f"- {name}: {each['shows']}" + (f" (failed: {each['wrong']})" if "wrong" in each else ""))
+    return INSTALLED.format(rows="\n".join(rows), images="\n".join(images), **found)
 
 
 # --- performance -----------------------------------------------------------------------------------------------------
@@ -169,8 +174,8 @@ kernels in Rust, and `make bench-guard` counts the instructions of eight kernels
 PEERS = """
 ## Compared with other programs
 
-`make bench` measured these numbers on {date}. The machine was a {processor} with {cores} cores, {system} and Python
-{python}, at a load average of {load:.0f}. The results of all programs were compared before the times were measured.
+`make bench` measured these numbers on {date}, on {cores} cores of the processor {processor}, with {system} and Python
+{python}. The load average was {load:.0f}. The results of all programs were compared before the times were measured.
 
 | column | contents |
 |---|---|

@@ -64,7 +64,7 @@ def make_results() -> str:
     )
     text += "| attribute | contents |\n|---|---|\n"
     for name, kind, about in read_parameters(texrs.Synthesis):
-        text += f"| `{name}` | {as_markdown(about)} ({as_markdown(kind)}) |\n"
+        text += f"| `{name}` | {as_markdown(about)} Type: {as_markdown(kind)}. |\n"
     text += "\n## Report keys of all functions\n\n" + tabulate("key", COMMON)
     text += "\n## Stage of all functions for materials\n\n" + tabulate("stage", MATERIAL_STAGES)
     for name in VERBS:

@@ -67,9 +67,7 @@ def explain(timed: bool) -> str:
     """Return the list of measures and their descriptions."""
     rows = [(name, unit, text) for name, (unit, text) in MEASURES.items()]
     if timed:
-        rows.append(
-            (SECONDS, "s", "processor seconds of all threads and programs, including the time to load a program")
-        )
+        rows.append((SECONDS, "", "processor time of all threads and programs, including the time to load a program"))
     entries = "".join(
         f"<dt>{escape(name)}{f' <small>{escape(unit)}</small>' if unit else ''}</dt><dd>{escape(text)}</dd>"
         for name, unit, text in rows

@@ -51,6 +51,6 @@ TASKS = {
         "The image itself, changed so that copies have no visible border. The results are shown as 2 x 2 copies.",
         judge_tile,
     ),
-    "hole": Task("A filled hole", "A square in the middle of the image was removed, and is filled.", judge_hole),
+    "hole": Task("A filled hole", "A square in the middle of the image was removed and then filled.", judge_hole),
 }
 """Tasks by the names that options use."""
