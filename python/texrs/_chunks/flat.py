@@ -37,7 +37,7 @@ from texrs.io._formats import FORMATS, RAW, check
 __all__ = ["HEADER", "RAW", "Filled", "check_suffix", "fill"]
 
 HEADER = ".nhdr"
-"""Suffix of the NRRD header next to a file of raw samples, which describes them."""
+"""Suffix of the NRRD header that describes the raw samples in a file next to it."""
 BLOCK = 2**24
 """Number of bytes per write if the system cannot allocate disk space in advance."""
 LARGEST = 2**63 - 1
@@ -279,7 +279,7 @@ def _name_journal(part: FilePath) -> FilePath:
 
 
 def _read_journal(part: FilePath, line: str, count: int) -> set[int] | None:
-    """Return the numbers of the finished chunks, or None without a part file of the same work."""
+    """Return the numbers of the finished chunks, or None if a part file of the same work does not exist."""
     if not part.is_file():
         return None
     try:
@@ -294,7 +294,10 @@ def _read_journal(part: FilePath, line: str, count: int) -> set[int] | None:
 
 
 def _take_room(part: FilePath, header: bytes, size: int) -> None:
-    """Create a file of a header and ``size`` bytes. Allocate its disk space, so that later writes cannot fail."""
+    """Create a file with a header and space for ``size`` bytes.
+
+    Allocate its disk space, so that later writes cannot fail.
+    """
     _name_journal(part).unlink(missing_ok=True)
     whole = len(header) + size
     if whole > LARGEST:

@@ -69,7 +69,8 @@ class InParts(ABC):
     ) -> Any:
         """Return a part of any size as a Dask array, whose blocks are computed on demand.
 
-        The texture is one key of the Dask graph. Dask sends it to each worker once, and its blocks share its caches.
+        The texture is one key of the Dask graph. Dask sends the texture to each worker once, and the blocks share its
+        caches.
 
         Parameters
         ----------
@@ -280,7 +281,7 @@ def check_spacing(path: Path, spacing: Sequence[float] | None, axes: int) -> Seq
 
 
 def write_filled(filled: Filled, path: Path, spacing: Sequence[float] | None = None) -> None:
-    """Write the requested file of a complete part file, and the header of raw samples."""
+    """Convert a complete part file to the requested file, and write the header of raw samples."""
     target = FilePath(path)
     if target.suffix.lower() == RAW:
         with atomic(target.with_suffix(HEADER)) as temporary:

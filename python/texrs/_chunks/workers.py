@@ -67,8 +67,8 @@ def run(
     numbers : sequence of int
         Numbers of the tasks.
     scheduler : None, int, str or distributed.Client
-        Workers that run the tasks: None is this process. An integer is a number of processes of this machine, which
-        are started for this work. An address or a client is a cluster.
+        Workers that run the tasks. None runs them in this process. An integer is the number of processes that are
+        started on this machine for this work. An address or a client selects a cluster.
     threads_each : int, optional
         Number of kernel threads of each worker. Default: processes share the cores, and a worker of a cluster uses its
         configured number of threads.
@@ -223,7 +223,7 @@ def _run_processes(
 ) -> Iterator[tuple[int, Any]]:
     """Run tasks in processes.
 
-    Each runs a list of neighbouring tasks, then takes tasks from the end of the longest list.
+    Each process runs a list of neighbouring tasks, then takes tasks from the end of the longest list.
     """
     payload = pack(work)
     each = threads_each or max(1, (os.cpu_count() or 1) // count)

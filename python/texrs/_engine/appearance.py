@@ -31,13 +31,13 @@ class Demand(NamedTuple):
     output : (points * 4) or (points) int16
         Requested values at the points of the output. With a single value per point, the other three values are 0.
     weight : (points) or (1) uint16
-        Cost of a squared difference of one, in 1/256: one number per point, or a single one. Windows that are not
-        related differ by about 2 * 512^2. If 0, nothing is requested.
+        Cost of a squared difference of 1, in units of 1/256, as one number per point or a single number. Unrelated
+        windows differ by about 2 * 512^2. If 0, nothing is requested.
     order : (any) uint32
         Samples in ascending order of their first value. Random candidates are then drawn from samples near the
         requested value. If empty, they are drawn from all samples.
     excess : int
-        Weight if a sample's first value is above the requested one, in 1/256 of the weight if it is below. If it is
+        Weight of a first value above the requested value, in 1/256 of the weight of a first value below it. If it is
         not 256, only first values are compared.
 
     """

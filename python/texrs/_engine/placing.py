@@ -84,7 +84,7 @@ def move_shape(
     canvas: tuple[int, int],
     depth: float,
 ) -> Moved | None:
-    """Move a shape by ``p -> centre + shift + matrix (p - centre)``. Return None if it leaves the canvas.
+    """Move a shape by ``p -> centre + shift + matrix (p - centre)``. Return None if the result is off the canvas.
 
     Parameters
     ----------

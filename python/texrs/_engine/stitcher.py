@@ -126,7 +126,7 @@ class Stitcher:
     costs : (K, K) float32
         Cost of two adjacent classes of colour, higher for rarer pairs.
     labels : uint32 array, optional
-        Element of each sample, counted from 1; 0 for the background.
+        Element of each sample, counted from 1, or 0 for the background.
     depth : float32 array, optional
         Distance of each sample to the background, in samples.
     sure : bool

@@ -1,10 +1,10 @@
 """Blending: correct the colours of a composite so that its seams disappear.
 
 The method is section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using
-deformation", 2006. It follows Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. The paper
-uses, as printed, the differences of the composite itself as the target, so the composite would be the solution. Here the
-target differences come from the sources on both sides of a seam. If a seam follows the outline of an element, the step
-across it is correct and is kept. Otherwise a fog around the element would remain.
+deformation", 2006. It follows Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. The paper uses, as
+printed, the differences of the composite itself as the target, so the composite would be the solution. Here the target
+differences come from the sources on both sides of a seam. If a seam follows the outline of an element, the step across
+it is correct and is kept. If such a step were smoothed, a fog around the element would remain.
 
 The correction depends only on the source map and on one map of the exemplar. It therefore works for each map of a
 material (colours, heights, normals) in any dtype.

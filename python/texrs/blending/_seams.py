@@ -41,7 +41,7 @@ class Look:
     parts: NDArray[np.uint16] | None
     """Index of the part of each pixel, (H, W). Borders of parts are not seams."""
     outlines: bool
-    """If True, outlines of elements keep their step."""
+    """If True, the steps across outlines of elements are kept."""
     interpolation: Interpolation
     map_type: Literal["colour", "vector", "slope"]
     green: Literal["up", "down"]

@@ -1,6 +1,6 @@
 """Define kinds of values: the form of their text on the command line, and the conversion to Python values.
 
-The other facts about options are taken from the signatures of the functions.
+All other properties of options are taken from the signatures of the functions.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Kind:
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
 EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a material, or sample:NAME.", file=True)
 SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
-"""Kind of an image that is aligned with the first one.
+"""Kind of an image that is aligned with the first image of the command.
 
 If the first image has an alpha channel, this image gets an opaque one. If the first image has none, an opaque alpha
 channel of this image is removed.

@@ -167,7 +167,8 @@ def read_kind(
 def fit(finish: RenderOptions, paths: Sequence[str], given: Mapping[str, Any]) -> RenderOptions:
     """Return the render options for a map.
 
-    Unless an option is given, light is kept in maps whose file names exclude colours.
+    Unless an option requests it, light is not removed from maps that do not contain colours, according to their file
+    names.
     """
     return finish if given["finish_flatten_lighting"] is not None else choose_finish(finish, paths[0])
 

@@ -94,7 +94,7 @@ class Options:
     kinds : mapping
         Kinds of parameters that neither the type nor the name determines.
     names : mapping
-        Names of options that differ from those of parameters. For a dataclass, the prefix of its fields.
+        Names of options that differ from the names of their parameters. For a dataclass, the prefix of its fields.
     leave : mapping
         Parameters without an option, each with the reason. Fields are written ``parameter.field``.
     makers : mapping
@@ -268,9 +268,11 @@ def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter
 
 
 def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add the options of functions to a command. It gets their texts as ``given``, for `Options.read`.
+    """Add the options of functions to a command.
 
-    They replace ``given`` in the signature of the command. Positional arguments come first.
+    The command gets the texts of the options as ``given``, for `Options.read`.
+
+    The options replace ``given`` in the signature of the command. Positional arguments come first.
     """
     options: dict[str, list[Option]] = {}
     for option in (o for each in several for o in each):

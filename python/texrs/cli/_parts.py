@@ -70,7 +70,7 @@ class InParts(Verb):
     """A command whose result can be larger than memory. Such a result is a part of an unbounded texture."""
 
     def make_parameters(self) -> list[inspect.Parameter]:
-        """Return the parameters of the command, followed by those for parts."""
+        """Return the parameters of the command, followed by the parameters for parts."""
         return [*Verb.make_parameters(self), *make_options()]
 
     def make(

@@ -49,7 +49,7 @@ LEFT = (
     "workers",
     "scheduler",
 )
-"""Parameters that are not recorded: those without an effect on the result, and names of outputs."""
+"""Parameters that are not recorded: parameters without an effect on the result, and names of outputs."""
 BRACES = re.compile(r"([^{}]*)\{([^{}/]*,[^{}/]*)\}([^{}/]*)")
 """Pattern of a text that names several files of a folder."""
 CHANGED = "changed while it was read"

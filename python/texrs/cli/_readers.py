@@ -138,7 +138,7 @@ def show_extent(sides: Iterable[tuple[int, float]]) -> str:
 
 
 def read_values(path: str, about: About) -> Array:
-    """Read values of the same kind as the exemplar. A single channel can have an axis or not."""
+    """Read values of the same kind as the exemplar. An axis for a single channel is optional."""
     given = fit_volume(read_array(path, about.axes), path, about)
     return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
 

@@ -125,7 +125,7 @@ def place_input(arguments: list[str]) -> list[str]:
 
 
 def as_texts(value: Any, where: str) -> list[str]:
-    """Return one text or several as a list."""
+    """Return one or several texts as a list."""
     several = [value] if isinstance(value, str) else value
     if not isinstance(several, list) or not all(isinstance(v, str) for v in several):
         raise InvalidInput(f"{where}: must be a text or a list of texts, got {value!r}")

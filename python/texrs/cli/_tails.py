@@ -1,4 +1,4 @@
-"""Split the words after a file name from it: size and type of raw samples, or options for reading a mask."""
+"""Separate a file name from the words after it: size and type of raw samples, or options for reading a mask."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MASKED = re.compile(rf"(?P<path>.+):(?P<words>{WORD}(?:,{WORD})*)")
 
 
 def split_tail(text: str) -> tuple[str, str]:
-    """Return a file name, and the words after it including their colon.
+    """Return a file name, and the words after it, starting with their colon.
 
     Examples
     --------

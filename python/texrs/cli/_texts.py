@@ -14,7 +14,7 @@ from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
 FOUND = "found"
-"""Word for values of a plane that texrs finds."""
+"""Word in place of the values of a plane that texrs finds itself."""
 PLANE = "plane:"
 """Prefix of the words that describe a plane."""
 

@@ -56,7 +56,7 @@ def measure_detail(example: Array, made: Array, where: Bools | None = None) -> f
 
 
 def list_bands(image: Array) -> list[Numbers]:
-    """Return the lightness of an image in octaves of detail, the finest first."""
+    """Return the lightness of an image, divided into octaves of detail from fine to coarse."""
     from scipy.ndimage import gaussian_filter
 
     softer = [find_lightness(image)]
@@ -114,7 +114,7 @@ def find_step(image: Array, axis: int) -> float:
 
 
 def measure_error(truth: Array, made: Array, hole: Bools) -> float:
-    """Return the root of the mean squared difference in the hole, in percent of the range."""
+    """Return the root mean squared difference in the hole, in percent of the range."""
     return float(np.sqrt(((truth[hole].astype(float) - made[hole]) ** 2).mean())) / 255 * 100
 
 

@@ -119,7 +119,7 @@ def run_embark(more: bool, program: str, asked: Request) -> Array:
 
 
 def run_resynthesizer(program: str, asked: Request) -> Array:
-    """Let the Resynthesizer's engine fill a hole: PROGRAM IMAGE.ppm MASK.pgm OUT.ppm, the hole 255."""
+    """Let the Resynthesizer's engine fill a hole: PROGRAM IMAGE.ppm MASK.pgm OUT.ppm. Pixels of the hole are 255."""
     from imageio.v3 import imread
 
     assert asked.hole is not None

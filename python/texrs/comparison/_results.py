@@ -10,7 +10,7 @@ from texrs._typing import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """A request to a method: a texture of a size from an image, or a hole in the image to fill."""
+    """A request to a method: a texture of a given size, or a hole in the image to fill."""
 
     picture: Array
     size: int

@@ -3,7 +3,7 @@
 The method is A. Lagae and P. Dutre, "An alternative for Wang tiles: colored edges versus colored corners", ACM
 Transactions on Graphics 25(4), 2006. Each corner of a lattice has one of three colours, chosen by a hash. The four
 corners of a cell select one of 81 tiles. Neighbouring tiles therefore agree along their edges and at their corners,
-and the texture is not periodic. A window takes only the time of a copy, at any position.
+and the texture is not periodic. Computing a window takes only as long as a copy, at any position.
 
 First, several tileable images are designed (`texrs.design_variants`). Then a strip for each pair of corners is cut
 from them. Finally the inside of each tile is cut into its ring of strips by one cut along all four edges
@@ -12,7 +12,7 @@ from them. Finally the inside of each tile is cut into its ring of strips by one
 the exemplar repeats on a lattice, tiles contain whole periods, and all their pieces are aligned with the lattice. The
 paper has neither the search nor the alignment. Its strips are twice as wide, so more content recurs.
 
-The atlas arranges the tiles on a torus of 9 x 9. Each tile is in it once and fits its neighbours. The atlas can
+The atlas arranges the tiles on a torus of 9 x 9. Each tile occurs once and fits its neighbours. The atlas can
 therefore be filtered, and is a tileable texture itself.
 """
 

@@ -20,7 +20,7 @@ SPARE = 8
 AGAIN = 8
 """Divisor of a tile's side that gives the minimum distance from a taken position.
 
-Closer pieces would repeat its content.
+Closer pieces would repeat the content of the piece at this position.
 """
 
 Place = tuple[int, int, int]
@@ -60,11 +60,11 @@ class Pictures:
         return out
 
     def look(self, places: Places) -> Array:
-        """Return the pixels at positions."""
+        """Return the pixels at the given positions."""
         return look_up(self.images, places)
 
     def weigh(self, places: Places) -> Floats:
-        """Return the extra costs of cuts at positions."""
+        """Return the extra costs of cuts at the given positions."""
         return look_up(self.penalties, places)
 
 
