@@ -23,7 +23,7 @@ from texrs.fields._field import Field, as_place, as_points, check_axes, refuse_f
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
 MAX_FRAMES = 2**24
-"""Maximum number of frames in an array, which is a volume of 256 voxels a side."""
+"""Maximum number of frames in an array, enough for a volume of 256 voxels a side."""
 MAX_POINTS = 4096
 """Maximum number of points with frames, because every voxel uses all of them."""
 
@@ -81,7 +81,7 @@ def make_grid(
 ) -> Field:
     """Return the field of `from_array`.
 
-    If ``opposed``, the nearest frame is used where neighbouring frames are opposite.
+    If ``opposed`` is True, the nearest frame is used where neighbouring frames are opposite.
     """
     given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim else 0

@@ -67,7 +67,7 @@ def space(field: Field, spacing: Sequence[float] | None) -> Field:
 
 
 def find_distances(spacing: Sequence[float] | None, value: object, axes: int) -> Sequence[float] | None:
-    """Return the given distances between voxels, or else the distances in the file of a volume, and report these.
+    """Return the given distances between voxels, or else report and return those in the file of a volume.
 
     The volume is a path, an array that `texrs.io.read_volume` returned, or an exemplar of one of them. The result is
     None if distances are neither given nor stated in the file.

@@ -332,7 +332,7 @@ class Conditions:
 
 
 def average_points(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
-    """Return the mean of the output points that each point of a level covers. The last point covers all that remain."""
+    """Return the mean of the output points that each point of a level covers. The last point also covers the rest."""
     sizes = [np.diff([*_find_starts(n, m, spacing), m]) for n, m in zip(shape, values.shape, strict=True)]
     return np.asarray(_pool(values, shape, spacing) / np.maximum(np.multiply.outer(*sizes), 1))
 

@@ -10,8 +10,8 @@ coordinates of its source sample in the exemplar, in fixed point. The steps of e
 4. The **corrector** changes places until every window of the output resembles a window of the exemplar
    (`texrs.growth.windows`, or a corrector of the caller).
 
-The caller passes each of these as a function. Levels have the numbers of the exemplar's pyramid, from 0 for the
-coarsest. An output may begin at a coarser level, with a number below 0.
+The caller passes the start, the constraints and the corrector as functions. Levels are numbered as in the exemplar's
+pyramid, from 0 for the coarsest. An output may begin at a coarser level, with a number below 0.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class Grown:
 
 
 def nothing(level: int, region: Region, spacing: int) -> Asked:
-    """Return no constraints, for any level."""
+    """Return empty constraints for any level."""
     return NOTHING
 
 

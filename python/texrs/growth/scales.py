@@ -22,8 +22,8 @@ __all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas"]
 FROM_ATLAS = Settings(passes=(12, 8, 4), reaches=(2, 2, 2), coarsest=32, rounds=6, candidates=1024)
 """Settings for synthesis from an atlas.
 
-They try more candidates, because many places of an atlas do not have the requested scale. The coarsest level has 32
-samples, so that scales can be distinguished there.
+These settings try more candidates, because many places of an atlas do not have the requested scale. The coarsest level
+has 32 samples, so that scales can be distinguished there.
 """
 
 WEIGHT = 1264

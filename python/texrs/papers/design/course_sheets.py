@@ -60,7 +60,7 @@ def lay_sheets(
     mirror : bool
         If True, every other sheet is mirrored along the courses.
     seed : int
-        Number that selects the courses.
+        Seed of the choice of courses.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def lay_sheets(
 
 
 def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int) -> NDArray[np.intp]:
-    """Return the numbers of courses that fill a size: in the exemplar's order, then from a random course on."""
+    """Return the indices of courses that fill a size: in the exemplar's order, then from a random course on."""
     found: list[tuple[float, list[int]]] = []
     for attempt in range(TRIES if wrap else 1):
         # A texture that does not wrap can begin within its first course, so it needs one more course.

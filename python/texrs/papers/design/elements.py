@@ -43,7 +43,7 @@ class Element:
     depth: float
     """Depth in pixels where the hard constraint begins.
 
-    It is smaller in a thin element, which would have no constraint otherwise.
+    This depth is smaller in a thin element, which would otherwise not contain a hard constraint.
     """
     axes: NDArray[np.float64]
     """(3,): standard deviation of the element's pixels along and across its longest axis, and angle of this axis.
@@ -84,7 +84,7 @@ def measure_elements(labels: Labels) -> list[Element]:
 
 
 def sum_up(labels: Labels) -> list[list[int]]:
-    """Return the sums over the pixels of each label of 1, row, column, row^2, row * column and column^2.
+    """Return the sums of 1, row, column, row^2, row * column and column^2 over the pixels of each label.
 
     The sums are exact integers, so that comparisons of elements do not depend on a linear algebra library.
     """

@@ -91,7 +91,7 @@ def mix(
     wrap : (bool, bool)
         Axes along which the texture is periodic.
     seed : int
-        Number that selects the territories.
+        Seed of the territories.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def mix(
 def draw_territories(
     shares: NDArray[np.float64], size: tuple[int, ...], territory: float, seed: int
 ) -> NDArray[np.uint16]:
-    """Return the number of the requested exemplar of each pixel.
+    """Return the index of the requested exemplar at each pixel.
 
     If Gumbel noise is added to the logarithms of the shares, the probability that an exemplar has the largest sum is
     its share. Smooth noise turns this random choice into territories.

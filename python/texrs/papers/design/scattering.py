@@ -51,7 +51,7 @@ Elements of a heap can overlap after half of these failures.
 CLUSTER, UNEVEN = 4.0, 0.5
 """Size of clusters in element sizes, and relative variation of the density between them.
 
-They are only used if the density is not a map.
+Clusters are only used if the density is not a map.
 """
 CELLS, AROUND, ROUNDS = 0.5, 2.5, 64
 """Side of the cells that measure density, and averaging distance for missing elements, in element sizes.
@@ -138,7 +138,7 @@ class ScatteredSheet:
     exemplar: NDArray[np.uint16]
     label: NDArray[np.uint32]
     layer: NDArray[np.int32]
-    """Exemplar number of the element at each pixel, 0 without an element."""
+    """Index of the exemplar whose element is at each pixel, or 0 for pixels without an element."""
     frames: list[NDArray[np.float64]]
     wrap: tuple[bool, bool]
 
@@ -213,7 +213,7 @@ def scatter(
     wrap : (bool, bool)
         Axes along which the texture is periodic.
     seed : int
-        Number that selects the elements and their places.
+        Seed of the choice of elements and places.
 
     Returns
     -------

@@ -100,7 +100,7 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
 
 
 def turned(asked: Request, surface: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the Jacobians of a surface, with the texture rotated in the requested direction."""
+    """Return the Jacobians of a surface after the texture is rotated as requested."""
     return surface if asked.turn is None else multiply(asked.turn, surface)
 
 

@@ -159,7 +159,7 @@ def _step_in(
 ) -> tuple[int, ...]:
     """Return the nearest source position that continues the lattice of the other boxes, or ``place`` if there is none.
 
-    It differs by a lattice vector from the position that the frame predicts (``ahead``).
+    The position differs by a lattice vector from the position that the frame predicts (``ahead``).
     """
     near = np.rint(np.linalg.solve(lattice.T.astype(np.float64), (np.array(place) - ahead).astype(np.float64)))
     steps = np.array(list(product((-1, 0, 1), repeat=len(place))))

@@ -241,7 +241,7 @@ class Layers:
         return Shown(shown, boxes.reshape(larger.shape)[here].reshape(-1), near, np.zeros(0, np.float32), table)
 
     def _below(self, key: Key) -> list[Key]:
-        """Return the keys of the boxes below a box. The first layer above the ground has none."""
+        """Return the keys of the boxes below a box. The first layer above the ground does not have any."""
         return [] if key[0] == 1 else self._meeting(key[0] - 1, self._region(key))
 
     def _meeting(self, layer: int, box: Region) -> list[Key]:

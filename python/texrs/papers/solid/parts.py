@@ -41,7 +41,7 @@ class Endless(InParts):
     @property
     @abstractmethod
     def key(self) -> str | None:
-        """Digest of all data that determine the texture, or None if there is none."""
+        """Digest of all data that determine the texture, or None if it cannot be computed."""
 
     @abstractmethod
     def __getitem__(self, index: Any) -> Array:
@@ -80,7 +80,7 @@ class _Windows:
 
     @property
     def key(self) -> str | None:
-        """Digest of the texture and the origin, or None if the texture does not have one."""
+        """Digest of the texture and the origin, or None if the texture does not have a key."""
         return None if self.texture.key is None else content_hash(self.texture.key, self.origin).hex()
 
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:

@@ -18,7 +18,7 @@ FAST = replace(Settings(), passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candid
 ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
 """Settings for windows of unbounded textures.
 
-Points around a window are computed in addition, so their number is kept small.
+Points around a window must also be computed, so their number is kept small.
 """
 
 CANDIDATES: dict[Quality, int] = {"preserve": 4, "optimise": 12}

@@ -483,7 +483,7 @@ class Texture(Endless):
 
 
 def _restore(kind: type[Texture], exemplar: Exemplar | Material, options: tuple[Any, ...], key: str | None) -> Texture:
-    """Return an unpickled texture, or an equal one from the cache, which has finished parts already."""
+    """Return an unpickled texture, or an equal texture from the cache, which already has finished parts."""
     names = ("field", "seed", "quality", "interpolation", "spacing", "cache_bytes", "memory_limit")
     given = dict(zip(names, options, strict=True))
 

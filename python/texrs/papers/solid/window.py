@@ -49,8 +49,8 @@ class PlaneTexture(Texture):
         Distances between rows and columns, in any unit. The field rotates in space, where pixels can be rectangles.
         The places and lengths of the field are in the same unit. Windows and points are still in pixels. Default: 1.
     cache_bytes : int
-        Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
-        MiB.
+        Maximum memory for finished parts, in bytes, 0 or more. Finished parts make windows next to them faster.
+        Default: 256 MiB.
     memory_limit : int, optional
         Maximum memory of one window in bytes. Default: the available memory, unless a lower limit is set
         (`texrs.limits`).
@@ -105,8 +105,8 @@ class SolidTexture(Texture):
         and lengths of the field are in the same unit. Windows and points are still in voxels. Default: the spacing
         that the exemplar's file states, else 1.
     cache_bytes : int
-        Maximum memory for finished parts, in bytes, 0 or more. They make windows next to them faster. Default: 256
-        MiB.
+        Maximum memory for finished parts, in bytes, 0 or more. Finished parts make windows next to them faster.
+        Default: 256 MiB.
     memory_limit : int, optional
         Maximum memory of one window in bytes. Default: the available memory, unless a lower limit is set
         (`texrs.limits`).

@@ -10,8 +10,8 @@ depends on others, the reach of the stage:
                 and w = max_i [ r sum_j |F_ij| + 1/2 ] is the extent of a window of radius r along an axis
                 of the output, over all frames F in the region
 
-Coordinates within the reach of a box's border are wrong and are cut off. The others are the same in every box.
-Finished parts of every stage are cached in a limited memory, so that windows next to them are faster.
+Coordinates within the reach of a box's border are wrong and are cut off. All other coordinates are the same in every
+box. Finished parts of every stage are cached in a limited memory, so that windows next to them are faster.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ The number limits the memory. The margin is still small compared with such a box
 _SIDES = {2: (8, 64), 3: (4, 16)}
 """Side of cached cells in points, by the number of axes: for all stages except the last, and for the last stage.
 
-The first is about the reach of a pass, because each pass extends its region to whole cells.
+The first side is about the reach of a pass, because each pass extends its region to whole cells.
 """
 _STRAY = 0.4
 """Maximum distance of a cell's random centre from its middle, as a share of its side, as in `Appearance.blocks`."""

@@ -29,7 +29,7 @@ Departures from the paper, with their reasons:
   otherwise.
 
 - For connected figures, the layout is shifted so that their elements move least. Displacements of neighbours differ by
-  at most a share of an element. Otherwise courses are torn if the layout does not have any.
+  at most a share of an element. Otherwise courses are torn if the layout does not have courses.
 
 - Layouts are enlarged until disjoint elements have room, and elements that still collide are pushed apart. If only the
   spacing is matched, elements touch and form chains.
@@ -231,7 +231,7 @@ def splice(
         - ``layout``: Kind of the layout of ``elements``: "disjoint", "jointed" or "connected".
         - ``scale``: Scale factor of the other layout.
         - ``angle``: Rotation of the other layout, in degrees.
-        - ``gain``: Factor within ``scale`` that gives the elements room; 1 if they fit without it.
+        - ``gain``: Factor within ``scale`` that makes room for the elements, or 1 if they fit without it.
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements that may be used, including copies beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.
@@ -440,7 +440,7 @@ def self_splice(
         - ``layout``: Kind of the layout of ``elements``: "disjoint", "jointed" or "connected".
         - ``scale``: Scale factor of the layout.
         - ``angle``: Rotation of the layout, in degrees.
-        - ``gain``: Factor within ``scale`` that gives the elements room; 1 if they fit without it.
+        - ``gain``: Factor within ``scale`` that makes room for the elements, or 1 if they fit without it.
         - ``targets``: Number of targets.
         - ``candidates``: Number of elements that may be used, including copies beyond the borders.
         - ``cost``: Mean squared distance from an element to its target, in pixels squared.

@@ -37,7 +37,7 @@ DISC = 0.45
 PATCH, SMALLEST, OVERLAP = 3.5, 1.0, 0.36
 """Side of a patch in spacings (at most half an image), minimum side in spacings, and overlap as a share of the side."""
 CLOSE = (0.7, 1.04)
-"""Minimum and maximum of the least distance between elements, as a share of the sum of their radii."""
+"""Lower and upper limit of the minimum distance between elements, as a share of the sum of their radii."""
 ROUGH, TIGHT, ROUNDS = 0.7, 0.92, 12
 """Minimum distance of sown elements before and after they are pushed apart, as a share of the least distance.
 

@@ -33,13 +33,13 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 SEEN = 0.1
-"""Share of visible background in a texture that is enough to complete its background."""
+"""Minimum share of visible background for which a texture's background is completed."""
 BELOW = 3
 """Width of the band inside outlines with a completed background, in pixels, so that elements can be cut into it."""
 CROWDED = 0.75
 """Minimum distance of entering elements from others, as a share of the sum of their radii."""
 ALIKE = 5
-"""Number of elements of similar size that are candidates to replace an entering one."""
+"""Number of elements of similar size that are candidates to replace an entering element."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,7 +178,7 @@ def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: in
 def choose_elements(
     a: ElementAnalysis, parts: Foreground, edit: Edit, step: NDArray[np.intp], seed: int
 ) -> tuple[Match, Bools]:
-    """Return the elements with their places, entering ones first, and True for elements that stay in place."""
+    """Return the elements with their places, entering elements first, and True for elements that stay in place."""
     extension, size = edit.extension, np.array(a.mask.shape)
     beyond = np.arange(len(extension.points)) >= extension.originals
     comes, wide = edit.inwards | beyond, max(a.box)
@@ -227,7 +227,7 @@ def measure_boxes(parts: Foreground) -> Points:
 
 
 def align_boxes(fragment: Points, whole: Points, cut: Bools) -> Points:
-    """Return the shift that moves the inner edge of a complete element to the inner edge of a cut one."""
+    """Return the shift that moves the inner edge of a complete element to the inner edge of a cut element."""
     first, last = cut[:, 0] & ~cut[:, 1], cut[:, 1] & ~cut[:, 0]
     aside = fragment - whole
     return np.asarray(np.where(first, aside[:, 1], np.where(last, aside[:, 0], 0.0)), np.float64)
@@ -247,8 +247,8 @@ def paste_elements(
 ) -> tuple[NDArray[np.uint32], Places]:
     """Return the target of each pixel of a moved element, counted from 1 (0 elsewhere), and its source pixel.
 
-    Moved elements cover the other elements (``rest``), and later ones cover earlier ones. The surroundings of an
-    element do not cover other elements.
+    Moved elements cover the other elements (``rest``), and later elements cover earlier elements. The surroundings of
+    an element do not cover other elements.
     """
     label, size = np.zeros(rest.shape, np.uint32), np.array(rest.shape)
     places = np.zeros((*rest.shape, 2), np.int32)

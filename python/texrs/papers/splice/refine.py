@@ -54,8 +54,8 @@ gradient of a patch, edges included, relative to the background.
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
 """Minimum number of patches as rough as the background for which other patches are not used.
 
-The second number is the minimum number of patches of any roughness. The third is the number of patches that are tried
-at most, because all patches of a plain background fit.
+The second number is the minimum number of patches of any roughness. The third is the maximum number of patches that
+are tried, because all patches of a plain background fit.
 """
 K, APART = 3, 0.05
 """Number of samples in a similarity set, and minimum distance between them, as a share of the shorter side."""

@@ -28,7 +28,7 @@ __all__ = ["Extension", "count_elements", "extend", "sow"]
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 Copies = tuple[Points, NDArray[np.intp], Bools]
-"""Elements of an extended texture: places, numbers in the texture, and True for each axis with a reflection."""
+"""Elements of an extended texture: places, indices in the texture, and True for each axis with a reflection."""
 Placed = tuple[Copies, Labels, list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]
 """Result of `_place_elements`: the copies and their pixels.
 
@@ -184,7 +184,8 @@ def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
 def _find_bounds(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
-    """Return the layout as the pixels continue, and the first and last corner of the extension in its coordinates."""
+    """Return the layout, continued like the pixels, and the first and last corner of the extension in its coordinates.
+    """
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Offset of the image in the output.
     disjoint = entry.layout == Layout.DISJOINT
@@ -323,5 +324,5 @@ def _list_shapes(entry: ElementAnalysis) -> tuple[list[NDArray[np.intp]], list[N
 
 
 def _round_half_up(place: Points) -> NDArray[np.intp]:
-    """Round to the nearest pixel, and halves up, so that points at a distance of whole pixels keep it."""
+    """Round to the nearest pixel, and halves up, so that points whole pixels apart stay whole pixels apart."""
     return np.asarray(np.floor(place + 0.5), np.intp)

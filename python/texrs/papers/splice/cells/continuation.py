@@ -26,7 +26,7 @@ __all__ = ["continue_cells"]
 Points = NDArray[np.float64]
 
 NEARLY = 0.75
-"""Minimum area of a cell that the border cuts to count as complete, as a share of the median area."""
+"""Minimum area of a cut cell that counts as complete, as a share of the median area."""
 DRAWN, LARGE = (16.0, 28.0), 320.0
 """Minimum and maximum width of a cell in the drawing of the joints, in pixels.
 

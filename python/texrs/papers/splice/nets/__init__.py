@@ -50,7 +50,7 @@ Points = NDArray[np.float64]
 SURE = 0.5
 """Minimum confidence of the layout for a connected texture without cells to count as a net."""
 FEWEST = 6
-"""Minimum number of knots. Fewer would repeat visibly."""
+"""Minimum number of knots. Fewer knots would repeat visibly."""
 LEAST = 8.0
 """Minimum distance of knots in pixels. Below it, lines cannot be distinguished from knots."""
 PATCH, CANDIDATES, WEIGHT = 0.8, 4, 3

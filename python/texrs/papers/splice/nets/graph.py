@@ -17,11 +17,11 @@ EMPTY = 1e-3
 A tolerance is needed because lattices have many knots on one circle.
 """
 FAR = 1.0
-"""Maximum distance from a knot in the features, in spacings. Larger distances are set to it."""
+"""Maximum distance from a knot in the features, in spacings. Larger distances are reduced to this value."""
 ASIDE = 0.5
 """Maximum distance from a line in the features, in spacings. The direction of a line has no weight at this distance."""
 DENSE = 1.0
-"""Distance between the sample points on a line, in pixels. They are used to find the nearest line."""
+"""Distance between the sample points on a line, in pixels. The sample points are used to find the nearest line."""
 
 
 def join_knots(points: Points) -> NDArray[np.intp]:

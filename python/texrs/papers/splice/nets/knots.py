@@ -25,7 +25,7 @@ The net then continues in gaps of a layout as it does in A.
 BAND = 0.3
 """Half width of the band between two targets, in spacings.
 
-A pixel in the band can belong to either knot. A pixel outside the band belongs to the nearer one.
+A pixel in the band can belong to either knot. A pixel outside the band belongs to the nearer target.
 """
 CORE = 0.18
 """Radius around a target that its knot always covers, in spacings."""

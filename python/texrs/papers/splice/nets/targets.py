@@ -114,7 +114,7 @@ def take_own_points(a: ElementAnalysis, size: tuple[int, int], unit: float) -> T
 def interpolate_layouts(own: Targets, wanted: Targets, strength: float) -> Targets:
     """Move knots a share of the way from their own places to the targets, matched by least squared distance (Eq. 4).
 
-    Knots without a target stay until a strength of 0.5. Targets without a knot get one from 0.5 on.
+    Knots without a target stay until a strength of 0.5. Targets without a knot get a knot from a strength of 0.5 on.
     """
     if strength <= 0:
         return own
