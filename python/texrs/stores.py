@@ -7,17 +7,21 @@ of a worker in advance.
 
 Notes
 -----
-Cost of a volume, by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3. A
-volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Each worker computes the boxes at
-the borders of its part again, so the cost is the number of boxes. With ``cache_bytes=512 << 20``, 1 to 8 workers
-compute 1.35 times the boxes that fill 1024^3 (1.49 times with half the cache), and 64 workers of 8 chunks each 1.83
-times. 512^3 takes 1.35, 1.49, 1.83 and 3.13 times. Two workers of at most 0.77 GiB (1.06 in the estimate) computed
-1024^3 in 3331 processor seconds for 58 thousand boxes, row by row. The present order of chunks along a curve needs 49
-thousand boxes. An estimate that was not measured: 64 workers compute 1024^3 in 3900 processor seconds, a minute each,
-at three quarters of the efficiency of one. It assumes cores of the same speed with their own memory, and a shared disk
-that takes 3 GB in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds without delay. The limit
-is the number of boxes computed twice. With 512 chunks for each of 64 workers, 4096^3 takes 1.35 times the boxes that
-fill it.
+The cost of a volume was measured by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 voxels in
+chunks of 128^3. A volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Neighbouring
+workers both compute the boxes at their common border, so the cost is the number of boxes.
+
+- 1024^3 voxels with ``cache_bytes=512 << 20``: 1 to 8 workers compute 1.35 times the boxes that fill the volume, or 1.49
+  times with half the cache. 64 workers of 8 chunks each compute 1.83 times the boxes.
+- 512^3 voxels with the same cache: 1, 2, 8 and 64 workers compute 1.35, 1.49, 1.83 and 3.13 times the boxes.
+- 4096^3 voxels: 64 workers of 512 chunks each compute 1.35 times the boxes.
+
+Two workers of at most 0.77 GiB (1.06 in the estimate) computed 1024^3 voxels in 3331 processor seconds for 58 thousand
+boxes, row by row. The present order of chunks along a curve needs 49 thousand boxes.
+
+An estimate that was not measured: 64 workers compute 1024^3 voxels in 3900 processor seconds, a minute each, at 75 % of
+the efficiency of one worker. It assumes cores of the same speed with their own memory, and a shared disk that takes 3 GB
+in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds without delay.
 
 See Also
 --------

@@ -72,7 +72,7 @@ def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, 
 
 
 def repeats(example: np.ndarray) -> float:
-    """Return the minimum difference of an image and itself, shifted by 1/4 to 1/2 of its shorter side, over the usual one."""
+    """Return the minimum difference of an image and its shift by 1/4 to 1/2 of the shorter side, over the usual one."""
     height, width = example.shape[:2]
     size = (2 * height, 2 * width)
     spectrum = fft.rfft2(example, size, axes=(0, 1))

@@ -96,7 +96,7 @@ class Comparison:
 
     @property
     def frequency_ratio(self) -> float:
-        """Frequency of the output divided by the frequency of the exemplar: 1 for equally fine, 0.5 for twice as coarse."""
+        """Frequency of the output over the frequency of the exemplar: 1 for equally fine, 0.5 for twice as coarse."""
         return self.frequency[1] / self.frequency[0]
 
     @property
