@@ -202,7 +202,7 @@ def _sow(
 
 
 def _measure_closest(points: Points, radius: Reals) -> float:
-    """Return the least distance of elements over the sum of their radii, as the 10 % quantile of all elements."""
+    """Return the 10 % quantile of the elements' least distances, each divided by the sum of two radii."""
     apart = np.hypot(*np.moveaxis(points[:, np.newaxis] - points, -1, 0)) / (radius[:, np.newaxis] + radius)
     np.fill_diagonal(apart, np.inf)
     return float(np.clip(np.quantile(apart.min(axis=1), 0.1), *CLOSE))

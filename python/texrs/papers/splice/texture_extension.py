@@ -184,8 +184,7 @@ def lay_out(entry: ElementAnalysis, *, beyond: bool) -> PointLayout:
 def _find_bounds(
     entry: ElementAnalysis, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
-    """Return the layout, continued like the pixels, and the first and last corner of the extension in its coordinates.
-    """
+    """Return the layout, continued like the pixels, and the extension's first and last corner in its coordinates."""
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Offset of the image in the output.
     disjoint = entry.layout == Layout.DISJOINT
