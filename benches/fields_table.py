@@ -2,12 +2,14 @@
 
     [TEXRS_TEXTURES=<folder>] python benches/fields_table.py [--size 256] [--seed 1] [--only NAME] [--pictures DIR]
 
-Each image (its middle 192 pixels a side; without a folder the samples) is grown under circular, zigzag, slanted,
-ramped and drawn frames. "fast" starts from blocks and corrects points, as SOLID once did everywhere. The cost of seams
-counts neighbours that are not neighbours in the exemplar. It is the difference between each of them and the exemplar's
-continuation of the other. The table gives the mean over all pairs of neighbours, in 1000ths of the range. Shares: four
-classes of brightness of equal size in the exemplar. The table gives the minimum and maximum share in the result
-divided by the share in the exemplar.
+The middle 192 x 192 pixels of each image are the exemplar. Without a folder, the images are the generated samples. A
+result is grown under circular, zigzag, slanted, ramped and drawn frames. The quality "fast" starts from blocks and
+corrects single points.
+
+A seam is a pair of neighbours that are not neighbours in the exemplar. Its cost is the difference between each pixel of
+the pair and the exemplar's continuation of the other pixel. The table gives the mean over all pairs of neighbours, in
+1000ths of the range. It also gives the minimum and maximum of the shares of four classes of brightness in the result,
+divided by their shares in the exemplar, where the classes are equally large.
 """
 
 from __future__ import annotations

@@ -4,12 +4,18 @@
         [--variants default,alone,plain,paper] [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]
         [--out table.md] [--pictures DIR]
 
-The textures are generated discs and ellipses on a floor and, with a folder, each image in it. `NAME-scale.npy` is the
-map of an image, the square root of area ratios, S^1.5. Maps of other images are measured. Variants: `alone` has no
-resized copies, `copies` has five and no plane, `plain` has no weight of scales. With `--evaluator`, a module with
-`perspective_agreement`, its rank correlation, slope and spread are columns. The rows `drawn` are its values for discs
-that are drawn to the same target, without synthesis. With `--tears`, a module with `Judge(exemplar).scores(picture)`,
-the share of torn cells is a column.
+The textures are generated discs and ellipses on a floor. With a folder, each image in it is also a texture. The scale
+map of an image is `NAME-scale.npy`, which contains square roots of areas, S^1.5. If the file is missing, the map is
+measured. Variants:
+
+- `alone` neither flattens nor resizes the exemplar;
+- `copies` uses four further sizes, and does not use the plane;
+- `plain` does not weight scales in the choice of patches;
+- `paper` is the algorithm as printed.
+
+With `--evaluator`, a module with `perspective_agreement`, the table has columns for its rank correlation, slope and
+spread. The rows `drawn` have its values for discs that are drawn to the same target, without synthesis. With `--tears`,
+a module with `Judge(exemplar).scores(picture)`, the table has a column for the share of torn cells.
 """
 
 from __future__ import annotations

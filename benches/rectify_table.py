@@ -3,15 +3,17 @@
     [TEXRS_TEXTURES=FOLDER] python benches/rectify_table.py [--pictures DIR]
         [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]
 
-Each floor, generated or specified by ``ground-truth.json`` in FOLDER, is flattened by `texrs.rectify` without hints.
-The true plane gives the size and stretch of the floor area that each pixel shows. The spread is the standard deviation
-of the natural logarithm of the size, and at most 0.08 is required. By hand: the homography of four clicked corners of
-a rectangle of the true plane, in whole pixels, one of them off. All are homographies, so straight lines stay straight.
+Each floor is generated, or specified by ``ground-truth.json`` in FOLDER, and flattened by `texrs.rectify` without
+hints. The true plane gives the size and the stretch of the floor area that each pixel shows. The spread is the
+standard deviation of the natural logarithm of this size. At most 0.08 is required. The columns "by hand" are for a
+person who clicks the four corners of a rectangle of the true plane. Their coordinates are whole pixels, and off by up
+to one pixel. All results are homographies, so straight lines stay straight.
 
-With an evaluator that has `tile`, both textures are tiled, ours by ``wrap=True`` and the other as it is cut. The table
-gives the failed bounds (a line inside may be 1.5 times as visible as in the flat texture). With an evaluator that has
-`Judge`, it gives the share of the tile that looks torn compared with the flat texture, after a roll by half the size.
-At most 0.18 is required. `--pictures` writes each photograph, its flat texture, and both tiles, 2 x 2 of each.
+With an evaluator that has `tile`, two tiles are judged: the result with ``wrap=True``, and the texture by hand as it
+is. The table gives the bounds that each tile fails. A line inside it may be 1.5 times as visible as in the flat
+texture. With an evaluator that has `Judge`, the tile is rolled by half of its size, and the table gives the share that
+looks torn compared with the flat texture. At most 0.18 is required. `--pictures` writes each photograph, its flat
+texture, and both tiles, 2 x 2 of each.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ def measure(made: texrs.Synthesis, true: texrs.Plane) -> tuple[float, float]:
 
 
 def click(plane: texrs.Plane, rng: np.random.Generator) -> texrs.Plane:
-    """Return the plane of four corners of a rectangle that a person clicks in a photograph, one pixel off."""
+    """Return the plane of four corners of a rectangle that a person clicks in a photograph, up to one pixel off."""
     rows, columns = plane.shape
     middle = plane.flatten(np.array([[0.62 * rows, 0.5 * columns]]))[0]
     for half in np.geomspace(0.5 * min(rows, columns), 8, 24):

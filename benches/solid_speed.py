@@ -3,10 +3,10 @@
     python benches/solid_speed.py [--rounds 3] [--threads N] [--quick] [--optimise]
 
 Volumes grow from 64^3 voxels of the sample "particles", by default under the field circular:axis=x. Images grow from
-256 x 256 pixels of "pebbles" under zigzag:period=64. The floor is the time of the multiplications and additions of the
-projections of all windows, in a float32 matrix product on the same cores. The kernel skips windows without borders of
-pieces, so it may be faster. The naive loop is the twin of the tests, with the same result to the bit. `--quick` skips
-256^3.
+256 x 256 pixels of "pebbles" under zigzag:period=64. The lower bound ("floor") is the time of the multiplications and
+additions of the projections of all windows, in a float32 matrix product on the same cores. The kernel skips windows
+without borders of pieces, so it may be faster than this bound. The naive loop is the twin of the tests, which has the
+same result to the bit. `--quick` skips 256^3.
 """
 
 from __future__ import annotations

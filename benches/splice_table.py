@@ -1,16 +1,22 @@
 """Splice each texture on the layout of each other one: a table and a contact sheet.
 
-    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--method paper] [--tears deep_quality.py]
+    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--method paper] [--tears
+    deep_quality.py]
 
 The folder contains ``b-disjoint``, ``c-connected`` and ``d-background``: images next to JSON files with a box,
 scribbles and a tag, all in (x, y). With ``--auto`` only the images are used. Without a folder the built-in samples are
 spliced.
 
-Each row is a texture, with means over all other layouts. It gives the method, and the share of targets with an element
-within 0.2 of its size (by the source map). It gives the reached share of the displacement, and the sharpness (mean
-gradient, divided by the texture's own), also for the background between separate elements only. It gives broken lines
-(`texrs.metrics`), the correlation of the results on two layouts, and the processor seconds. With ``--tears``, a module
-with `Judge(exemplar).scores(picture)`, it gives the share of torn cells on its own layout and on others.
+Each row is a texture, with means over all other layouts. The columns are:
+
+- the method;
+- the share of targets with an element within 0.2 of its size, by the source map;
+- the share of the displacement that was reached;
+- the mean gradient, divided by the texture's own, of the whole image and of the background between separate elements;
+- broken lines (`texrs.metrics`);
+- the share of torn cells on the texture's own layout and on others, with ``--tears``, a module with
+  `Judge(exemplar).scores(picture)`;
+- the correlation of the results on two layouts, and the processor seconds.
 """
 
 from __future__ import annotations
@@ -75,7 +81,8 @@ def measure_sharpness(image: np.ndarray) -> float:
 
 
 def measure_ground(a: ElementAnalysis, result: texrs.Synthesis) -> float:
-    """Return the mean gradient of the background between elements, divided by the texture's own, or NaN if it is flat."""
+    """Return the mean gradient of the background between elements, divided by the texture's own, or NaN if it is flat.
+    """
 
     def steep(image: np.ndarray, elements: np.ndarray) -> float:
         grey = to_picture(image).mean(axis=-1)

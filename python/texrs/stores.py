@@ -11,17 +11,18 @@ The cost of a volume was measured by ``benches/stores_table.py`` (``volume``, ``
 chunks of 128^3. A volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Neighbouring
 workers both compute the boxes at their common border, so the cost is the number of boxes.
 
-- 1024^3 voxels with ``cache_bytes=512 << 20``: 1 to 8 workers compute 1.35 times the boxes that fill the volume, or 1.49
-  times with half the cache. 64 workers of 8 chunks each compute 1.83 times the boxes.
+- 1024^3 voxels with ``cache_bytes=512 << 20``: 1 to 8 workers compute 1.35 times the boxes that fill the volume. With
+  half the cache, they compute 1.49 times the boxes. 64 workers of 8 chunks each compute 1.83 times the boxes.
 - 512^3 voxels with the same cache: 1, 2, 8 and 64 workers compute 1.35, 1.49, 1.83 and 3.13 times the boxes.
 - 4096^3 voxels: 64 workers of 512 chunks each compute 1.35 times the boxes.
 
 Two workers of at most 0.77 GiB (1.06 in the estimate) computed 1024^3 voxels in 3331 processor seconds for 58 thousand
 boxes, row by row. The present order of chunks along a curve needs 49 thousand boxes.
 
-An estimate that was not measured: 64 workers compute 1024^3 voxels in 3900 processor seconds, a minute each, at 75 % of
-the efficiency of one worker. It assumes cores of the same speed with their own memory, and a shared disk that takes 3 GB
-in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds without delay.
+The following is an estimate that was not measured. 64 workers compute 1024^3 voxels in 3900 processor seconds, which is
+a minute each. This is 75 % of the efficiency of one worker. The estimate assumes cores of the same speed with their own
+memory, and a shared disk that takes 3 GB in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds
+without delay.
 
 See Also
 --------
