@@ -149,8 +149,8 @@ def _leave(number: int, frame: Any) -> None:
     """Abort the running task so that it removes partial files. Later signals must not interrupt this."""
     global _LEAVING
     if not _BUSY:
-        # End the process at once, because no task is running that could leave partial files. The pool would print an
-        # exception.
+        # End the process at once, because no task is running that could leave partial files. Do not raise an
+        # exception, because the pool would print it.
         os._exit(1)
     if not _LEAVING:
         _LEAVING = True
@@ -258,7 +258,7 @@ def _run_processes(
                     if not isinstance(future.exception(), BrokenProcessPool):
                         yield one.tasks.pop(future), future.result()
                 if any(future in one.tasks for future in ready):
-                    # Blame only the first task of the queue, because the others had not been started.
+                    # Blame only the first task of the queue, because the others had not started.
                     first, *others = one.tasks.values()
                     one.tasks.clear()
                     one.end()

@@ -52,7 +52,7 @@ class Look:
         frames = _list_frames(source, at)
         places = source.coordinates[at] + np.float32(step) * frames[..., axis]
         which = source.exemplar[at]
-        # Allow for rounding, which the coordinates of mirrored or rotated copies contain.
+        # Allow a small tolerance, because the coordinates of mirrored or rotated copies are rounded.
         last = np.array(source.shapes, np.float32)[which] - 1
         inside: Bools = np.all((places >= -1e-3) & (places <= last + np.float32(1e-3)), axis=-1)
         row = SourceMap(

@@ -288,7 +288,7 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
         if path is None:
             continue
         if option == "out" and io.is_store(path):
-            # Always run the command, because the writer of a store skips the chunks that exist.
+            # Always run a command that writes a store, because the writer skips existing chunks.
             return False
         if option == "out" and os.path.isdir(path):
             packed = any(context.params.get(option) is not None for option in ("pack", "convention"))

@@ -272,8 +272,8 @@ def check_output(
         if like is None:
             temporary.touch()
         else:
-            # Use the longest side of the result, because formats limit it, and the minimum value, because .hdr rejects
-            # negative values. Ignore NaN, which can mark unknown pixels.
+            # Use the longest side of the result, because some formats limit it, and the minimum value, because .hdr
+            # rejects negative values. Ignore NaN, which can mark unknown pixels.
             axes = len(size)
             longest = min(max(size), LONGEST_PROBE)
             least = np.nan_to_num(np.fmin.reduce(like, axis=None))

@@ -190,7 +190,7 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
     arguments: list[str | None] = []
     options: dict[str, Any] = {}
     names: list[str] = []
-    # The options of a batch can contain places, because they can be for any command.
+    # A batch can run any command, so its options can contain places.
     placed = command.name == "batch"
     for p in command.params:
         value = given.get(p.name)
@@ -211,8 +211,8 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     shared = any(given.get(name) is not None for name in ("workers", "scheduler"))
     if shared and given.get("origin", "") is None and given.get("chunks") is None:
-        # Workers and schedulers are not recorded, but they make the result a part of an unbounded texture. Record this
-        # as an origin.
+        # Workers and schedulers are not recorded, but they make the result a part of an unbounded texture. Record an
+        # origin, which has the same effect.
         options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
     names = [split_tail(name)[0] for name in names]
     files = {name: status for name in names if (status := read_status(name)) is not None}

@@ -40,7 +40,7 @@ class Spaced(Field):
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         step = np.array(self.spacing)
-        # An array of frames has one frame for each voxel of any shape, so its points stay in voxels.
+        # An array of frames covers whole voxels, whatever their shape, so its points stay in voxels.
         at = points if self.field._placed_in_voxels else points * step
         return np.asarray(self.field._frames(at) * (step / step[:, np.newaxis])[..., np.newaxis])
 

@@ -83,7 +83,7 @@ def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Fli
     """Return the permitted mirror images: as requested, or by default all that look like the exemplar."""
     if options.allow_mirror is None:
         # If rotation is forbidden, do not mirror by default: the example can have an upper side, light from one side,
-        # or letters. The statistics can miss these.
+        # or letters. The image statistics can miss these properties.
         return (NONE,) if options.rotate == 0 else exemplar.mirror_symmetries
     return ALL if options.allow_mirror else (NONE,)
 

@@ -502,7 +502,7 @@ def self_splice(
         entry = read_elements(mine, resized)
         edited = self_splice(check_resized(entry), steps, **rest) if steps else resized
         return report_resized(mine, entry, resized, edited, steps)
-    # Rearrange separate elements on their background; warp all other textures.
+    # Rearrange separate elements on their background, and warp all other textures.
     laid = rearrange(mine, steps, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
     if laid is not None:
         result = compose_edit(mine, laid, seed=number, screening=screening)

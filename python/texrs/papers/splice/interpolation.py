@@ -61,7 +61,7 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
     key = content_hash("interpolate", np.packbits(free), shape)
     solver = factorise({key: lambda: _make_laplacian(free)})[key]
     flow = np.zeros((2, *shape))
-    # Sum the given displacements of neighbouring element pixels; the background has displacement 0 until it is solved.
+    # Sum the given displacements of neighbouring element pixels. The background has displacement 0 until it is solved.
     flow[:, :-1] += out[:, 1:]
     flow[:, 1:] += out[:, :-1]
     flow[:, :, :-1] += out[:, :, 1:]

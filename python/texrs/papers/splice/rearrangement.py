@@ -98,8 +98,8 @@ def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progr
     match, still = choose_elements(a, parts, edit, step, seed)
     watch("match", 1.0)
     base, seen = move_picture(a, step)
-    # Keep the background and elements that do not move. Also keep foreground outside all elements, unless its side
-    # that the border cut would enter the image.
+    # Keep the background and elements that do not move. Also keep foreground outside all elements, unless the side
+    # that the border cuts would enter the image.
     number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
@@ -190,7 +190,8 @@ def choose_elements(
     away = ((extension.points < 0) & (shift <= 0)) | ((extension.points > size - 1) & (shift >= 0))
     shown &= (shift != 0).any(axis=1) & ~(around | (away & ~np.array(edit.cyclic))).any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
-    # Sort the elements so that later ones cover earlier ones. Later entering elements also choose their places first.
+    # Sort the elements so that later ones cover earlier ones. Among the entering elements, later ones also choose
+    # their places first.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]
     element, goal = extension.element[chosen].copy(), edit.points[chosen].copy()
     comes, inwards = comes[chosen], edit.inwards[chosen]

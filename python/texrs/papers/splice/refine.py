@@ -109,8 +109,8 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
         filled = fill_with_patches(image, draft, ground, scale, seed, progress)
         if filled is not None:
             return filled
-    # Continue the source coordinates of the nearest known pixel over the hole. If they reach a pixel that is not
-    # background, use a random background pixel.
+    # Continue the source coordinates of the nearest known pixel over the hole. If the coordinates reach a pixel that
+    # is not background, use a random background pixel.
     at = np.argwhere(holes)
     start = near[:, holes].T
     there = places[start[:, 0], start[:, 1]] + (at - start)

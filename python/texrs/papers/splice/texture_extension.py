@@ -140,7 +140,8 @@ def sow(entry: ElementAnalysis, size: tuple[int, int], margin: int) -> Extension
     beyond = (found.points != parts.points[found.of]).any(axis=1)
     flips = np.repeat(beyond[:, np.newaxis], 2, axis=1)
     mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
-    # Points were sown far enough apart for the elements, but not always for the background around each element.
+    # Require less free space than for copies, because points are sown far enough apart for the elements, but not
+    # always for the background around them.
     placed = _place_elements(entry, mask.shape, (found.points - low, found.of, flips), least=SOWN_FREE)
     return _stamp(entry, pixel, mask, mirrored, placed, low + offset)
 
@@ -286,7 +287,7 @@ def _place_elements(
     number = instance.reshape(-1)
     kept: list[int] = []
     turns: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
-    # Place the copies in order; skip copies that would overlap others.
+    # Place the copies in order, and skip copies that would overlap others.
     for k in np.flatnonzero(wanted & ~beyond).tolist():
         i = int(of[k])
         at = steps[i] + (int(spots[k, 0]) * width + int(spots[k, 1]))

@@ -233,7 +233,7 @@ def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> 
     share = count / (cells.area[of] * factor.prod())
     found, covered = [], np.zeros(shape, bool)
     turn = np.where(cells.whole[of], np.where(share >= SEEN, 0, 1), 2)
-    # Place complete cells first, and of these the most visible ones first.
+    # Place complete cells before cut cells, and the most visible cells of each group first.
     for k in np.lexsort((of, -share, turn)).tolist():
         if share[k] < (SEEN, HINTED, SEEN)[turn[k]]:
             continue
