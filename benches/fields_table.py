@@ -6,11 +6,10 @@ The middle 192 x 192 pixels of each image are the exemplar. Without a folder, th
 result is grown under circular, zigzag, slanted, ramped and drawn frames. The quality "fast" starts from blocks and
 corrects single points.
 
-A seam is a pair of neighbours that are not neighbours in the exemplar. Its cost is the difference between each pixel of
-the pair and the exemplar's continuation of the other pixel. The table gives the mean over all pairs of neighbours, in
-1000ths of the range. It also gives the minimum and maximum of the shares of four classes of brightness in the result,
-divided by their shares in the exemplar, where the classes are equally large.
-"""
+A seam is a pair of neighbours that are not neighbours in the exemplar. Its cost is the difference between each pixel
+of the pair and the exemplar's continuation of the other pixel. The table gives the mean over all pairs of neighbours,
+in 1000ths of the range. It also gives the minimum and maximum of the shares of four classes of brightness in the
+result, divided by their shares in the exemplar, where the classes are equally large."""
 
 from __future__ import annotations
 

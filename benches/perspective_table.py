@@ -14,9 +14,8 @@ measured. Variants:
 - `paper` is the algorithm as printed.
 
 With `--evaluator`, a module with `perspective_agreement`, the table has columns for its rank correlation, slope and
-spread. The rows `drawn` have its values for discs that are drawn to the same target, without synthesis. With `--tears`,
-a module with `Judge(exemplar).scores(picture)`, the table has a column for the share of torn cells.
-"""
+spread. The rows `drawn` have its values for discs that are drawn to the same target, without synthesis. With
+`--tears`, a module with `Judge(exemplar).scores(picture)`, the table has a column for the share of torn cells."""
 
 from __future__ import annotations
 

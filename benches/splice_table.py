@@ -81,8 +81,7 @@ def measure_sharpness(image: np.ndarray) -> float:
 
 
 def measure_ground(a: ElementAnalysis, result: texrs.Synthesis) -> float:
-    """Return the mean gradient of the background between elements, divided by the texture's own, or NaN if it is flat.
-    """
+    """Return the mean gradient of the background between elements, divided by the texture's own; NaN if it is flat."""
 
     def steep(image: np.ndarray, elements: np.ndarray) -> float:
         grey = to_picture(image).mean(axis=-1)

@@ -157,7 +157,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
     assert main([*command, "-q"]) == 0
     assert made("out") == ["a/two.png", "one.jpg"]
     assert said("out/a/two.png")["arguments"] == ["../../photos/a/two.png", "../../masks/a/two_mask.png"]
-    # A single mask applies to all images, in every way to give it, also if it is among the inputs.
+    # A single mask applies to all images, however it is given, and even if it is among the inputs.
     put("photos/hole.png", HOLE)
     for number, words in enumerate(
         (

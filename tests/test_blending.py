@@ -390,7 +390,7 @@ def test_seams_disappear(designed):
 
 
 def test_away_from_seams_differences_stay(designed):
-    """D6: gradients more than 3 pixels from a seam, and the colours at large."""
+    """D6: gradients more than 3 pixels from a seam, and the colours as a whole."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     _, result = designed

@@ -104,7 +104,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
     report = json.loads(Path("stages/report.json").read_text(encoding="utf-8"))
     assert report["edit"] == EDITS
     assert report["size"] == [64, 64]
-    # The report of a run applies the same edits again.
+    # The same edits are read from the report of the run.
     again = ["scale-map", "in.png", "-o", "again.png", "--mask", "mask.png", "--edit", "stages/report.json", "-q"]
     assert main([*again, "--size", "64x64"]) == 0
     assert (iio.imread("again.png") == iio.imread("out.png")).all()

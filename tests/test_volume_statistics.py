@@ -285,7 +285,7 @@ def test_reports_of_pictures_and_of_floats():
     report = volume.compare(one, other, field=fields.identity(2))
     assert report.two_point.shape == (2, 2, 13)
     assert report.values < 0.1
-    # Floats with another range are the same texture.
+    # Floats with another range represent the same texture.
     grey = volume.lightness(one) * 900 - 200
     shifted = volume.compare(grey, grey)
     assert_allclose(shifted.relative_shares, 1)

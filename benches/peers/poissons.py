@@ -9,7 +9,7 @@ from frame import Arrays, Row, Work, is_mostly_near, is_near, keep_some
 
 
 def make_scene(side: int) -> dict[str, Any]:
-    """Return two images. The first takes the differences of the second."""
+    """Return two images. The first one gets the differences of the second one."""
     from skimage import data
     from skimage.transform import resize
 

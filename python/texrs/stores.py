@@ -7,8 +7,8 @@ of a worker in advance.
 
 Notes
 -----
-The cost of a volume was measured by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 voxels in
-chunks of 128^3. A volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Neighbouring
+The cost of a volume was measured by ``benches/stores_table.py`` (``volume``, ``model``), on particles of 48^3 voxels
+in chunks of 128^3. A volume is assembled from boxes, here of 39^3, of about 0.06 processor seconds each. Neighbouring
 workers both compute the boxes at their common border, so the cost is the number of boxes.
 
 - 1024^3 voxels with ``cache_bytes=512 << 20``: 1 to 8 workers compute 1.35 times the boxes that fill the volume. With
@@ -19,10 +19,10 @@ workers both compute the boxes at their common border, so the cost is the number
 Two workers of at most 0.77 GiB (1.06 in the estimate) computed 1024^3 voxels in 3331 processor seconds for 58 thousand
 boxes, row by row. The present order of chunks along a curve needs 49 thousand boxes.
 
-The following is an estimate that was not measured. 64 workers compute 1024^3 voxels in 3900 processor seconds, which is
-a minute each. This is 75 % of the efficiency of one worker. The estimate assumes cores of the same speed with their own
-memory, and a shared disk that takes 3 GB in that minute. It also assumes a scheduler that starts 512 tasks of 8 seconds
-without delay.
+The following is an estimate that was not measured. 64 workers compute 1024^3 voxels in 3900 processor seconds, which
+is a minute each. This is 75 % of the efficiency of one worker. The estimate assumes cores of the same speed with their
+own memory, and a shared disk that takes 3 GB in that minute. It also assumes a scheduler that starts 512 tasks of 8
+seconds without delay.
 
 See Also
 --------
