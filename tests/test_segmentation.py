@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from texrs import samples
-from texrs._arrays import to_lab
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, segment
-from texrs.exemplar.components import fill_crescents, find_elements
-from texrs.exemplar.evidence import measure_creases
 from texrs.exemplar.regularity import Lattice, find_lattice, measure_direction, measure_polarity
 from texrs.exemplar.shapes import Shapes, measure_solidity
 
@@ -38,49 +35,39 @@ def matched(found, truth, share=0.7):
 
 
 @pytest.mark.parametrize(
-    ("name", "share"), [("dots", 0.6), ("pebbles", 0.65), ("leaves_and_flowers", 0.4), ("beans", 0.3)]
+    ("name", "share"), [("dots", 0.85), ("pebbles", 0.75), ("leaves_and_flowers", 0.9), ("beans", 0.5)]
 )
 def test_elements_are_the_elements_that_were_drawn(name, share):
     sample = drawn(name)
     found = segment(sample.image)
     assert (found.kind, found.reason) == ("components", "")
     assert matched(found.elements, sample.labels) >= share * sample.labels.max()
-    # No element is found twice. A found element is usually one true element, or several that could not be separated.
-    assert found.count <= 1.1 * sample.labels.max()
+    # Nothing is found twice.
+    assert found.count <= 1.15 * sample.labels.max()
 
 
 def test_touching_discs_are_parted_where_the_crease_is():
-    rows, columns = np.mgrid[:80, :120]
-    light, truth = np.full((80, 120), 0.05), np.zeros((80, 120), int)
-    for label, (row, column) in enumerate([(40, 40), (40, 75)], start=1):
+    rows, columns = np.mgrid[:120, :200]
+    light, truth = np.full((120, 200), 0.05), np.zeros((120, 200), int)
+    centres = [(60, 30), (60, 65), (60, 100), (60, 135), (60, 170), (25, 100), (95, 100)]
+    for label, (row, column) in enumerate(centres, start=1):
         height = 1 - ((rows - row) ** 2 + (columns - column) ** 2) / 19.0**2
         shade = 0.35 + 0.5 * np.sqrt(np.maximum(height, 0))
         over = (height > 0) & (shade > light)
         light[over], truth[over] = shade[over], label
-    lab = to_lab(np.repeat(light[..., None], 3, -1).astype(np.float32))
-    found = find_elements((light > 0.2).astype(np.int32), measure_creases(lab))
-    assert found.max() == 2
-    assert matched(found, truth, 0.9) == 2
+    found = segment(light.astype(np.float32), ElementOptions(segmentation="components"))
+    assert matched(found.elements, truth, 0.85) == len(centres)
 
 
-def test_a_mark_on_a_thing_is_part_of_it():
-    rows, columns = np.mgrid[:60, :60]
-    far = np.hypot(rows - 30, columns - 30)
-    ring = ((far < 20) & (far > 8)).astype(np.int32)
-    found = find_elements(ring, np.zeros((60, 60), np.float32))
-    assert found.max() == 1
-    assert found[30, 30] == 1
-
-
-def test_the_lit_part_of_a_thing_stands_for_it():
-    rows, columns = np.mgrid[:60, :120]
-    far = np.hypot(rows - 30, columns - 30)
-    crescent = (far < 20) & (np.hypot(rows - 26, columns - 24) > 16)
-    elements = crescent.astype(np.int32)
-    assert fill_crescents(elements).sum() > 1.3 * crescent.sum()
-    # A filled crescent does not cover another element.
-    elements[20:24, 20:24] = 2
-    assert (fill_crescents(elements) == elements).all()
+def test_marks_are_part_of_their_elements():
+    rows, columns = np.mgrid[:160, :160]
+    image, truth = np.full((160, 160), 0.1, np.float32), np.zeros((160, 160), int)
+    for label, (row, column) in enumerate(((r, c) for r in (30, 80, 130) for c in (30, 80, 130)), start=1):
+        far = np.hypot(rows - row, columns - column)
+        image[far < 18], truth[far < 18] = 0.8, label
+        image[far < 6] = 0.1
+    found = segment(image, ElementOptions(segmentation="components"))
+    assert matched(found.elements, truth, 0.9) == 9
 
 
 def test_hulls_come_out_at_most_two_per_cent_too_large():
@@ -110,7 +97,9 @@ def blotched_cloth():
 
 
 @pytest.mark.parametrize(
-    "image", [samples.grit().image, samples.bark().image, blotched_cloth()], ids=["grit", "bark", "cloth"]
+    "image",
+    [np.random.default_rng(0).random((160, 160, 3)), samples.bark().image, blotched_cloth()],
+    ids=["noise", "bark", "cloth"],
 )
 def test_nonsense_takes_the_grid_and_says_why(image):
     found = segment(image)
@@ -122,8 +111,8 @@ def test_nonsense_takes_the_grid_and_says_why(image):
 
 def test_a_constant_image_has_no_elements_and_takes_the_grid():
     found = segment(np.full((64, 64, 3), 128, np.uint8))
-    assert (found.kind, found.layers.max(), found.lattice) == ("grid", 0, None)
-    assert found.reason == "elements cover 0% of the image, less than 5%"
+    assert (found.kind, found.lattice) == ("grid", None)
+    assert "are not elements of a texture" in found.reason
     assert segment(np.full((64, 64), 7.0), ElementOptions(segmentation="components")).count == 0
 
 
@@ -132,7 +121,7 @@ def test_one_element_is_found():
     image = np.where(np.hypot(rows - 30, columns - 34) < 14, 230, 20).astype(np.uint8)
     found = segment(image)
     assert (found.kind, found.count) == ("components", 1)
-    assert abs(int((found.elements > 0).sum()) - int((image > 100).sum())) < 60
+    assert abs(int((found.elements > 0).sum()) - int((image > 100).sum())) < 90
 
 
 def test_fewer_layers_are_made_where_there_are_fewer_colours():
@@ -171,6 +160,7 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         (PICTURE, {"layers": 0}, "layers"),
         (PICTURE, {"layers": 17}, "layers"),
         (PICTURE, {"layers": 2.5}, "layers"),
+        (PICTURE, {"layers": 2, "segmentation": "grid"}, "layers"),
         (PICTURE, {"segmentation": "cells"}, "segmentation"),
         (PICTURE, {"segmentation": None}, "segmentation"),
         (PICTURE, {"labels": np.zeros((31, 32), int)}, "labels"),
@@ -302,12 +292,14 @@ def test_what_has_no_side_does_not():
     assert measure_polarity(noise[:16, :16]) == (0, 0, 0)
 
 
-def test_further_layers_are_taken_where_they_find_more() -> None:
-    """Two layers miss the stones that are as dark as the background."""
-    sample = samples.pebbles((192, 192))
-    assert segment(sample.image).count > 1.3 * segment(sample.image, ElementOptions(layers=2)).count
-    flowers = samples.leaves_and_flowers((192, 192)).image
-    assert segment(flowers).count == segment(flowers, ElementOptions(layers=2)).count
+def test_a_number_of_layers_makes_them_the_elements() -> None:
+    image = samples.pebbles((96, 96)).image
+    found, same = (
+        segment(image, ElementOptions(layers=3)),
+        segment(image, ElementOptions(layers=3, segmentation="none")),
+    )
+    assert (found.kind, found.elements.max()) == ("none", 2)
+    assert (found.elements == same.elements).all()
 
 
 def test_progress_rises_and_stops_the_work():

@@ -13,29 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import log_single, to_lab
-from texrs._typing import Bools, Floats, Labels
-from texrs.exemplar.shapes import widen
+from texrs._arrays import to_lab
+from texrs._typing import Floats, Labels
 from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.regions import felzenszwalb
 
-__all__ = ["Regions", "mark_smooth"]
+__all__ = ["Regions"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
 """Radii of the mean-shift filter: in pixels, and in colour units of [0, 1]."""
 MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60 / 255, 0.4, 24
 """Parameters of the graph-based merge: scale in colour units of [0, 1], blur in pixels, and minimum area in pixels."""
-
-FINE, AROUND = 1.0, 2.0
-"""Standard deviations of two Gaussians, in pixels. Changes that the first one removes are grain.
-
-The amount of grain is averaged with the second one.
-"""
-TWO_KINDS = 0.75
-"""Minimum share of the variance of the amount of grain that is between the classes of smooth and grainy areas.
-
-For a normal distribution, the share is 0.64.
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,27 +81,3 @@ def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: in
             if mine.any():
                 centres[k] = np.average(points[mine], axis=0, weights=weight[mine])
     return np.unique(nearest, return_inverse=True)[1]
-
-
-def mark_smooth(rgb: Floats) -> Bools | None:
-    """Return a mask of smooth areas among fine grain, such as stones on sand.
-
-    Return None if the image does not have both smooth and grainy areas.
-
-    The amount of grain is divided by the lightness, so that a material has the same amount in light and in shade.
-    """
-    from scipy.ndimage import gaussian_filter
-    from skimage.filters import threshold_otsu
-
-    light = rgb.mean(axis=-1)
-    fine = np.abs(light - gaussian_filter(light, FINE))
-    amount = log_single((gaussian_filter(fine, AROUND) + 1e-3) / (gaussian_filter(light, AROUND) + 0.02))
-    if np.ptp(amount) < 1e-6:
-        return None
-    smooth = amount < threshold_otsu(amount)
-    share = float(smooth.mean())
-    between = share * (1 - share) * float(amount[smooth].mean() - amount[~smooth].mean()) ** 2
-    if between < TWO_KINDS * float(amount.var()):
-        return None
-    # Widen smooth areas, because the average includes grain beyond their outlines.
-    return np.asarray(widen(smooth), bool)

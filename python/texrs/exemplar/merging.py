@@ -1,6 +1,6 @@
 """Merge parts of a label image until the evidence supports all remaining separations.
 
-The caller defines the evidence. `texrs.exemplar.components` defines it for parts of a mask. This module defines it for
+The caller defines the evidence. `texrs.exemplar.necks` defines it for parts of a mask. This module defines it for
 a tessellation, which has no background. Many merged cells can be as solid as one cell, so the usual size of cells is
 used as evidence as well.
 """

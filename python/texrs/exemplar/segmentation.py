@@ -1,8 +1,8 @@
-"""Divide an exemplar into colour layers, and the layers into elements.
+"""Divide an exemplar into a background and the elements that DESIGN moves.
 
-For layers, see `texrs.exemplar.layers`: a mean-shift filter, a graph-based merge, and k-means of the mean colours of
-regions. Elements (child layers) are the connected components of all layers except the background, split where elements
-touch. If the components are not convincing, a jittered grid of cells is used instead.
+The elements are those of `texrs.exemplar.element_finder`. If an image has none, or if they are the meshes of a net, a
+jittered grid of cells is used instead. The layers of the paper are in `texrs.exemplar.layers`: a mean-shift filter, a
+graph-based merge, and k-means of the mean colours of regions.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 from texrs._arrays import as_choice, as_float, as_image, as_instance, as_int, as_list, as_rgb, to_unit, try_array
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
-from texrs._progress import ask, listen
+from texrs._progress import answering, ask, listen
 from texrs._show import brief
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
-from texrs.exemplar.backgrounds import USUAL_LAYERS, find_foreground
-from texrs.exemplar.components import fill_crescents
 from texrs.exemplar.courses import Courses, find_courses
+from texrs.exemplar.element_finder import Arrangement, FoundElements, find_elements
 from texrs.exemplar.layers import Regions
 from texrs.exemplar.regularity import Lattice, find_lattice
 from texrs.exemplar.shapes import mark_outlines
@@ -33,6 +32,10 @@ __all__ = ["ElementOptions", "Kind", "Segmentation", "segment"]
 Kind: TypeAlias = Literal["auto", "components", "grid", "none"]
 Marks: TypeAlias = NDArray[np.integer[Any]] | NDArray[np.bool_]
 
+SURE = 0.75
+"""Least probability that elements are separate, in a heap or jointed, so that they can be moved."""
+USUAL_LAYERS = 2
+"""Default number of colour layers: a background and one layer above it."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the shorter side of the exemplar."""
 
@@ -44,15 +47,12 @@ class ElementOptions:
     Attributes
     ----------
     layers : int, optional
-        Number of colour layers, 1 to 16. Fewer are used if the image has fewer colours. If the background has fine
-        grain, smooth areas belong to the layer above it. Default: two, unless three or four find clearly more separate
-        elements of the same size.
+        Number of colour layers, 1 to 16, if whole layers move ("none"). If it is given, "auto" means "none". Fewer are
+        used if the image has fewer colours. Default: 2.
     segmentation : {"auto", "components", "grid", "none"}
-        Method for finding elements. "components": connected areas of the layers above the background. "grid": jittered
-        cells of 1/6 of the side, for images without separate elements. "none": whole layers. "auto": components, or
-        the grid if components are not convincing. Components are not convincing if they cover less than 5 % of the
-        image, or one covers more than 25 %. The same holds if they are ragged or of very different sizes. They are
-        also not convincing if their outlines have no more contrast than their inside or their surroundings.
+        Elements that move. "components": the elements that `texrs.exemplar.find_elements` finds. "grid": jittered
+        cells of 1/6 of the side, for images without elements. "none": whole colour layers, as in the paper. "auto":
+        the elements, or the grid if there are none or if they are the meshes of a net.
     labels : (H, W) array of int, or a list of one per exemplar, optional
         Elements marked by hand: one number per element, where 0 is the background. They replace the segmentation.
 
@@ -78,6 +78,8 @@ class ElementOptions:
         if self.layers is not None:
             as_int(self.layers, "layers", 1, 16)
         as_choice(self.segmentation, "segmentation", ("auto", "components", "grid", "none"))
+        if self.layers is not None and self.segmentation in ("components", "grid"):
+            raise InvalidInput(f'layers: requires segmentation="none", got {self.segmentation!r}')
         for marks in as_list(self.labels):
             found = try_array(0 if marks is None else marks)
             if found.dtype.kind not in "biu":
@@ -140,6 +142,8 @@ class Segmentation:
         Lattice of the exemplar, if any. None for elements marked by hand.
     courses : Courses, optional
         Courses of the exemplar, if any. The exemplar does not repeat along them, so `lattice` is None in this case.
+    layout : {"separate", "heap", "jointed", "net", "none"}, optional
+        Layout of the elements (`texrs.exemplar.find_elements`). None if they are not components.
 
     Examples
     --------
@@ -156,6 +160,7 @@ class Segmentation:
     reason: str
     lattice: Lattice | None = None
     courses: Courses | None = None
+    layout: Arrangement | None = None
 
     __repr__ = brief
 
@@ -268,23 +273,34 @@ def segment(
         return number_marks(options.labels, (height, width))
     rgb = np.ascontiguousarray(as_rgb(to_unit(pixels)))
     watch = Steps(progress)
-    regions = Regions.of(rgb, watch)
-    if options.segmentation == "none":
-        whole = regions.layers(options.layers or USUAL_LAYERS)
+    if options.segmentation == "none" or options.layers is not None:
+        whole = Regions.of(rgb, watch).layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
     lattice = find_lattice(rgb)
     watch()
     courses = find_courses(rgb, lattice)
     lattice = None if courses else lattice
+    watch()
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
-    if options.segmentation == "grid":
-        layers = regions.layers(options.layers or USUAL_LAYERS)
-    else:
-        layers, elements, fault = find_foreground(rgb, regions, options.layers, watch)
+    if options.segmentation != "grid":
+        with answering(watch):
+            found = find_elements(rgb)
+        fault = find_fault(found)
         if options.segmentation == "components" or not fault:
-            return Segmentation(layers, fill_crescents(elements), "components", "; ".join(reasons), lattice, courses)
+            layers = (found.labels > 0).astype(np.int32)
+            return Segmentation(layers, found.labels, "components", "; ".join(reasons), lattice, courses, found.layout)
         reasons.insert(0, fault)
-    return Segmentation(layers, draw_cells(height, width), "grid", "; ".join(reasons), lattice, courses)
+    cells = draw_cells(height, width)
+    return Segmentation((cells > 0).astype(np.int32), cells, "grid", "; ".join(reasons), lattice, courses)
+
+
+def find_fault(found: FoundElements) -> str:
+    """Return the reason why the elements of an image cannot be moved, or an empty text if they can."""
+    apart = sum(found.layouts[layout] for layout in ("separate", "heap", "jointed"))
+    if not found.elements or apart < SURE:
+        other = "the meshes of a net" if found.layouts["net"] > found.layouts["none"] else "not elements of a texture"
+        return f"the areas that are found are {other} with a probability of {1 - apart:.0%}"
+    return ""
 
 
 class Steps:

@@ -25,8 +25,10 @@ from texrs.papers.design.plan import Plan
 
 __all__ = ["classify", "deform_elements"]
 
-DENSE, RAGGED = 0.42, 0.825
-"""Share of the image above which elements form a heap, and solidity (area / convex hull) below which they are leaves.
+DENSE, CROWDED, RAGGED = 0.42, 0.55, 0.825
+"""Share of the image above which elements form a heap, and the share if they are found to be separate.
+
+The last value is the solidity (area / convex hull) below which the elements of a heap are leaves.
 
 Leaves and flowers rarely have the shape of another element, so they move like separate elements.
 """
@@ -42,7 +44,8 @@ def classify(parts: Segmentation) -> Arrangement:
         return "full"
     if parts.kind == "none":
         return "layers"
-    if np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+    most = CROWDED if parts.layout == "separate" else DENSE
+    if np.count_nonzero(parts.elements) <= most * parts.elements.size:
         return "apart"
     return "heap" if measure_solidity(parts.elements) >= RAGGED else "leaves"
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
-from texrs.exemplar.components import split_touching
 from texrs.exemplar.contours import paint, trace
+from texrs.exemplar.necks import split_touching
 from texrs.exemplar.shapes import Shapes, mark_outlines, renumber
 from texrs.point_sets import PointLayout, continue_on_lattice
 from texrs.quilting import Picture, quilt
@@ -199,7 +199,7 @@ def _enclose(drawn: Floats, unit: float) -> Labels:
     """
     from skimage.segmentation import watershed
 
-    pieces = split_touching(drawn > CLOSED, np.zeros_like(drawn))
+    pieces = split_touching(drawn > CLOSED)
     seeds = renumber(pieces, np.bincount(pieces.ravel()) >= LEAST * unit**2)
     return np.asarray(watershed(1 - drawn, seeds), np.int32)
 
