@@ -36,8 +36,7 @@ This takes half the time of all sides. Seams are 1 % more visible, measured in 7
 WIDEST = 0.3
 """Maximum side, as a share of the shorter side of the image."""
 CLEARLY = 0.97
-"""Smaller patches are used if the visibility of their seams, relative to that of larger patches, is below this limit.
-"""
+"""Maximum visibility of the seams of a smaller patch that is preferred, relative to the seams of the larger patch."""
 WITHIN = 1.3
 """Maximum side, relative to the side of a square as large as all holes.
 

@@ -30,7 +30,7 @@ SMALLEST = 64
 LARGEST = 520
 """Maximum longer side after shrinking, in pixels. Slopes of finer patterns contain little information."""
 FINE = 1.0, 1.6
-"""Standard deviations of the Gaussians before slopes are computed, in samples. Each should find the same plane."""
+"""Standard deviations, in samples, of the Gaussians that blur the image. Each should give the same plane."""
 HALVED, FIRST = 400, 4
 """Minimum longer side in pixels for first rounds at half the resolution; and maximum number of these rounds."""
 RIGHT, STRAIGHT = (8.0, 15.0), 20.0

@@ -29,7 +29,7 @@ SMOOTH = 1.0
 STEEP = 0.5
 """Minimum slope of a border, as a share of the root mean square of the slopes around it."""
 AROUND = 0.06
-"""Standard deviation of the windows for this mean, as a share of the longer side."""
+"""Standard deviation of the windows for the mean of squared slopes, as a share of the longer side."""
 SHORTEST = 12.0
 """Minimum length of a line, in pixels."""
 THIN = 0.6

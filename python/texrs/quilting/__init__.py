@@ -20,8 +20,8 @@ Departures from the paper, with their reasons:
 - A patch has a cost for samples that other patches already use, and for continuing exactly where a neighbour ends. The
   cost is added, because a factor on the match would be zero for an exact continuation, which would always win.
 - A texture with courses is only quilted along the courses. Its images are placed so that their joints coincide.
-- For large textures, several rows of patches are cut in parallel, each row two patches behind the row above. A patch's
-  cost for repetition counts patches that were cut before all of these rows' present patches.
+- For large textures, several rows of patches are cut in parallel, each row two patches behind the row above. The cost
+  for repetition then does not count patches that are cut at the same time.
 - A patch is rejected if it is the mirror image of its overlap. The two would meet without a seam at the mirror axis,
   but the symmetry is conspicuous.
 """

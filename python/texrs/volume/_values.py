@@ -61,7 +61,7 @@ def check_field(field: object, axes: int) -> Field | None:
 
 
 def guess_axes(image: Array) -> int:
-    """Return the number of spatial axes. With three axes, a last axis of up to 4 entries contains channels."""
+    """Return the number of spatial axes. The last of three axes contains channels if it is at most 4 long."""
     return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
 
 

@@ -62,7 +62,7 @@ def render_volume(
     size : int
         Longer side of the image in pixels, 16 to 4096. Default: 512.
     azimuth : float
-        Angle of the view to the right of the front, in degrees. If 0, it is seen from the front. Default: 40.
+        Angle of the view to the right of the front, in degrees. If 0, the volume is seen from the front. Default: 40.
     elevation : float
         Angle of the view above the front, in degrees, -90 to 90. Default: 30.
     transfer : str or sequence of (value, colour, alpha), optional
