@@ -126,7 +126,7 @@ SIZES = {
     "design tiny.png": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "splice tiny.png sample:dots": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "design in.png --element-labels small-mask.png": "small-mask.png: must be integers of shape 96 x 64, got uint8 30 x 40",
-    "design in.png in.png --density small-mask.png": "or a map 192 x 128 or 192 x 128 with 1 channel; got shape 30 x 40",
+    "design in.png in.png --density small-mask.png": "array of shape 192 x 128 or 192 x 128 with 1 channel; got shape 30 x 40",
     "slice volume.tif --oblique 99,99,99/1,1,0": "--oblique: must give a cut through the volume",
     "extend in.png --slant 0": "--top, --bottom, --left, --right: at least one must be above 0",
 }

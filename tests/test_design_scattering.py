@@ -132,9 +132,9 @@ def test_densities_are_checked(grit, pebbles, options, message):
 
 
 def test_there_must_be_things(grit, pebbles):
-    with pytest.raises(InvalidInput, match="^density: must have at least two exemplars"):
+    with pytest.raises(InvalidInput, match="^density: requires at least two exemplars"):
         texrs.design(grit, 64, density=0.2)
     plain = np.full((64, 64, 3), 90, np.uint8)
     assert isinstance(texrs.Exemplar(plain).segment(), Segmentation)
-    with pytest.raises(InvalidInput, match="^density: must have separate elements in exemplar 1"):
+    with pytest.raises(InvalidInput, match="^density: exemplar 1 must have separate elements"):
         texrs.design([pebbles, plain], 64, density=0.2)

@@ -193,7 +193,7 @@ def test_design_parts_what_lies_across_a_border() -> None:
 
 @pytest.mark.parametrize("exemplar", [ENTRY.image[:64], [ENTRY.image, ENTRY.image]], ids=["shape", "several"])
 def test_elements_of_another_texture_get_a_sentence(exemplar: object) -> None:
-    with pytest.raises(InvalidInput, match=r"elements: must have the shape of the only exemplar, got \(96, 96\)"):
+    with pytest.raises(InvalidInput, match=r"elements: an ElementAnalysis of shape \(96, 96\) requires one exemplar"):
         texrs.design(exemplar, 64, elements=ENTRY)
 
 

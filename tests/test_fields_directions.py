@@ -127,7 +127,7 @@ def test_files_of_directions(tmp_path: Path, suffix: str) -> None:
         (lambda: fields.from_directions(WOUND, up=(0, 0, 0)), "up: must be one nonzero vector"),
         (lambda: fields.from_gradient(np.zeros(4)), "volume: must be numbers"),
         (lambda: fields.from_gradient(np.zeros((4, 4))), "all have length 0"),
-        (lambda: fields.from_gradient(Z, across=True), "across: only available for images"),
+        (lambda: fields.from_gradient(Z, across=True), "across: must be False for a volume"),
         (lambda: fields.from_structure(np.ones((8, 8))), "volume: must not be constant"),
         (lambda: fields.from_structure(Z, sigma=-1), "sigma"),
     ],

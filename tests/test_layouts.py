@@ -240,11 +240,11 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ),
         (
             lambda: texrs.splice(DOTS, replace(WALL, known=np.ones((160, 160), np.int32))),
-            "layout.known: must be labels of shape",
+            "layout.known: must be an array of labels of shape",
         ),
         (
             lambda: texrs.splice(DOTS, replace(WALL, known=np.full((160, 160), 2**31 - 1, np.int32))),
-            "layout.known: must be labels of shape",
+            "layout.known: must be an array of labels of shape",
         ),
         (lambda: texrs.splice(DOTS, WALL, layout_scale=0), "layout_scale: must be a number"),
         (

@@ -91,11 +91,12 @@ def test_scales_that_the_exemplar_has_not_are_made_or_brought_to_those_it_has(fl
     mixed = small.copy()
     mixed[:24] = 1
     with pytest.warns(
-        UserWarning, match=r"target: 50.0% of it is outside the scales of the exemplar's copies, by a factor of"
+        UserWarning,
+        match=r"target: 50.0% of the pixels are outside the scales of the exemplar's copies, by a factor of",
     ):
         held = grow(floor, 48, target=mixed, augment_scales=False)
     assert held.report["outside"]["share"] == pytest.approx(0.5)
-    with pytest.raises(InvalidInput, match="target: must be within"):
+    with pytest.raises(InvalidInput, match="target: some scales must be from"):
         grow(floor, 48, target=small, augment_scales=False)
 
 
@@ -168,7 +169,7 @@ BAD = [
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: must be floats"),
     ({"target": np.ones((5, 5, 7), np.float32)}, "target: must have shape"),
-    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: cannot be combined with a scale map"),
+    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: cannot be combined with a given scale_map"),
     (
         {"scale_map": "auto", "scale_measurement": {"min_feature_size": 3}},
         "scale_measurement: must be a texrs.scale_maps.Measuring",

@@ -241,7 +241,7 @@ def test_what_is_no_plane_and_has_many_sizes_is_bent_in_copies():
 def test_what_is_too_small_is_shown_as_small_as_there_is(weave):
     far = 20 * EYE * np.ones((32, 32, 1, 1))
     far[:16] = 2 * EYE
-    with pytest.warns(UserWarning, match="target: 50.0% of it is outside the scales"):
+    with pytest.warns(UserWarning, match="target: 50.0% of the pixels are outside the scales"):
         made = texrs.perspective(weave, "front", target=far, seed=1)
     np.testing.assert_allclose(made.stages["target"][16:], 1 / 8, rtol=1e-3)
 
@@ -263,16 +263,16 @@ def test_a_column_that_repeats(weave):
         ({"target": "plane:tilt=9"}, "target: must be plane:slant=DEGREES"),
         ({"target": "plane:slant=steep"}, "target: must be plane:slant=DEGREES"),
         ({"target": "plane:slant=99"}, "target: slant: must be a number between 0 and 88"),
-        ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but slant 80"),
+        ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but with slant 80"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: matrices must have scales of .* 64 of 64 do not"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
         ({"target": np.zeros((8, 8, 3))}, "target: normals: no pixel shows a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* must be floats"),
         ({"target": np.ones((8, 8, 3, 3))}, "target: must have shape"),
-        ({"target": make_column(8), "method": "paper"}, "method: cannot be combined with surfaces"),
+        ({"target": make_column(8), "method": "paper"}, "method: 'paper' cannot be combined with a surface"),
         ({"scale_map": "plane:slant=x"}, "scale_map: must be plane:slant=DEGREES"),
         ({"scale_map": "above"}, "scale_map: must be one of auto, front"),
-        ({"scale_map": Plane((9, 9), 20)}, "scale_map: must be a plane in an image of"),
+        ({"scale_map": Plane((9, 9), 20)}, "scale_map: a plane must belong to an image of"),
         ({"fov": 400}, "fov: must be a number between 1 and 170"),
         ({"scale_map": "plane:slant=30", "fov": 40}, "fov: cannot be combined with a plane"),
         ({"scale_map": Plane((128, 128), 30), "fov": 40}, "fov: cannot be combined with a plane"),

@@ -156,7 +156,7 @@ def test_a_single_index_selects_a_plane() -> None:
 @pytest.mark.parametrize(
     ("index", "says"),
     [
-        ((slice(0, 4),), "must have 3 ranges"),
+        ((slice(0, 4),), "must be indexed by 3 ranges"),
         ((slice(None, 4), slice(0, 4), slice(0, 4)), "start:stop, .*got :4"),
         ((slice(0, None), slice(0, 4), slice(0, 4)), "start:stop, .*got 0:"),
         ((slice(0, 4, 2), slice(0, 4), slice(0, 4)), "without a step, got 0:4:2"),

@@ -81,7 +81,7 @@ def from_directions(
     axes = given.shape[-1] if given.ndim else 0
     if given.dtype.kind not in "buif" or axes not in (2, 3) or given.ndim != axes + 1 or not given.size:
         raise InvalidInput(
-            f"directions: must be numbers of shape (R, C, 2) or (P, R, C, 3), got {given.dtype} of {given.shape}"
+            f"directions: must be numbers of shape (R, C, 2) or (P, R, C, 3), got {given.dtype} of shape {given.shape}"
         )
     letters = _LETTERS[axes - 2]
     as_choice(along, "along", tuple(letters))
@@ -135,7 +135,7 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     slopes = _slopes(_as_map(volume), sigma)
     if as_bool(across, "across"):
         if slopes.shape[-1] != 2:
-            raise InvalidInput("across: only available for images; a volume has no single direction along its contours")
+            raise InvalidInput("across: must be False for a volume, which has no single direction along its contours")
         slopes = np.stack([-slopes[..., 1], slopes[..., 0]], axis=-1)
     return from_directions(slopes, along=along)
 
@@ -175,7 +175,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     sigma = as_float(sigma, "sigma", 0, 100)
     slopes = _slopes(_as_map(volume), sigma / 2)
     if not np.abs(slopes).max():
-        raise InvalidInput("volume: must not be constant, because it would have no grain")
+        raise InvalidInput("volume: must not be constant, because a constant array has no grain to follow")
     axes = slopes.shape[-1]
     tensor = np.empty((*slopes.shape, axes))
     for i in range(axes):
@@ -188,7 +188,9 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
 def _as_map(volume: ArrayLike) -> NDArray[np.float64]:
     given = try_array(volume)
     if given.dtype.kind not in "buif" or given.ndim not in (2, 3) or min(given.shape) < 2:
-        raise InvalidInput(f"volume: must be numbers of shape (R, C) or (P, R, C), got {given.dtype} of {given.shape}")
+        raise InvalidInput(
+            f"volume: must be numbers of shape (R, C) or (P, R, C), got {given.dtype} of shape {given.shape}"
+        )
     check_memory(8 * given.size, "volume")
     return np.asarray(given, np.float64)
 

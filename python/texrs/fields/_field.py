@@ -217,7 +217,7 @@ class Field(ABC):
         first = np.broadcast_to(first, (self.axes,)) if first.ndim == 0 else first
         if first.dtype.kind not in "ui" or first.shape != (self.axes,):
             raise InvalidInput(
-                f"origin: must be an integer, or {self.axes} of them; got {first.dtype} of {first.shape}"
+                f"origin: must be one integer or {self.axes} integers; got {first.dtype} of shape {first.shape}"
             )
         if max(map(abs, first.tolist())) > FAR:
             raise InvalidInput(f"origin: must be integers from -{FAR} to {FAR}, got {first.tolist()}")
@@ -311,9 +311,11 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
         if not np.isfinite(frames[:, :, i]).all():
             why = "is not finite"
         elif abs(det[i]) < LEAST_DETERMINANT:
-            why = f"is flat: its determinant is {det[i]:.3g}, at least {LEAST_DETERMINANT:g} is needed"
+            why = (
+                f"is flat: its determinant is {det[i]:.3g}, but must have a magnitude of at least {LEAST_DETERMINANT:g}"
+            )
         else:
-            why = f"stretches one way more than {MAX_CONDITION:g} times as much as another"
+            why = f"stretches one direction more than {MAX_CONDITION:g} times as much as another"
         raise InvalidInput(f"{name}: the frame at {place} {why}")
     return inverse
 
@@ -323,7 +325,7 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
         raise InvalidInput(
-            f"{name}: must be numbers of shape (..., {axes}), ({', '.join(_NAMES[axes - 2])}) each; "
+            f"{name}: must be numbers of shape (..., {axes}), with ({', '.join(_NAMES[axes - 2])}) of each point; "
             f"got {given.dtype} of shape {given.shape}"
         )
     at = np.ascontiguousarray(given, np.float64)

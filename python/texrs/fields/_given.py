@@ -103,7 +103,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
     else:
         raise InvalidInput(
             "must be directions (R, C, 2), (P, R, C, 3) or frames (R, C, 2, 2), (P, R, C, 3, 3); "
-            f"got {given.dtype} of {given.shape}"
+            f"got shape {given.shape}"
         )
     if axes is not None and field.axes != as_axes(axes):
         raise InvalidInput(f"must have {axes} axes, got shape {given.shape}, a field with {field.axes} axes")
@@ -198,7 +198,7 @@ def _parse_options(words: str) -> dict[str, Any]:
         key, _, value = (p.strip() for p in part.partition("="))
         if key not in _OPTIONS:
             raise InvalidInput(
-                f"field: a file must be followed only by {', '.join(f'{o}=' for o in _OPTIONS)}; got {part!r}"
+                f"field: options of a file must be among {', '.join(f'{o}=' for o in _OPTIONS)}; got {part!r}"
             )
         if key == "up":
             try:

@@ -90,7 +90,7 @@ def parse(
 
     """
     if not isinstance(text, str):
-        raise InvalidInput(f"field: must be words, such as zigzag:period=64, got {type(text).__name__}")
+        raise InvalidInput(f"field: must be a string such as zigzag:period=64, got {type(text).__name__}")
     name, _, rest = text.strip().partition(":")
     if name not in _KNOWN:
         near = get_close_matches(name, _KNOWN, 1)
@@ -101,8 +101,8 @@ def parse(
     for part in rest.split(",") if rest.strip() else []:
         key, equals, value = (p.strip() for p in part.partition("="))
         if key not in allowed or not equals or not value:
-            takes = ", ".join(f"{k}=" for k in allowed) or "nothing"
-            raise InvalidInput(f"field: {name} takes {takes}; got {part.strip()!r}")
+            takes = ", ".join(f"{k}=" for k in allowed) or "no options"
+            raise InvalidInput(f"field: {name} accepts {takes}; got {part.strip()!r}")
         if key in options:
             raise InvalidInput(f"field: {key} is given twice in {text.strip()!r}")
         options[key] = _parse_value(key, value)

@@ -90,7 +90,7 @@ def make_grid(
     sides = given.shape[:axes]
     if prod(sides) > MAX_FRAMES:
         raise InvalidInput(
-            f"frames: must be at most {MAX_FRAMES} frames, got {prod(sides)}; give fewer frames, which are interpolated"
+            f"frames: must contain at most {MAX_FRAMES} frames, got {prod(sides)}; give fewer frames, which are interpolated"
         )
     box = sides if extent is None else as_size(extent, "extent", axes=axes, limit=2**62)
     start = as_place(origin, axes, "origin").tolist()
@@ -145,7 +145,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     if at.shape != (len(given), axes):
         raise InvalidInput(f"points: must have shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
     if len(np.unique(at, axis=0)) < len(at):
-        raise InvalidInput("points: must differ, but two frames are at one point")
+        raise InvalidInput("points: must all be different, but two frames are at the same point")
     turns, stretches = _split(given, lambda index: at[index])
     return _Scattered(axes, at, turns, stretches)
 
@@ -325,8 +325,8 @@ def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float6
         logs[..., index] = _to_matrices((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     if mirrored not in (0, count):
         raise InvalidInput(
-            f"frames: must all mirror or none, got {mirrored} of {count} that mirror; a frame between them would be "
-            "flat"
+            f"frames: must either all be mirrored or all not, got {mirrored} mirrored of {count}; a frame interpolated "
+            "between them would be flat"
         )
     if uneven > 1e-5:
         return turns, logs
@@ -340,7 +340,7 @@ def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[n
     if flat.any():
         place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(flat)[0])].tolist())
         raise InvalidInput(
-            f"field: the frames around ({place}) point in opposite directions, and have no frame between them"
+            f"field: the frames around ({place}) point in opposite directions, so no frame can be interpolated between them"
         )
     turn = rotations(turn)
     if stretch is None:

@@ -405,7 +405,9 @@ def _as_plane(value: object, axes: int, name: str) -> tuple[int, int]:
 def _as_matrix(value: ArrayLike) -> NDArray[np.float64]:
     given = try_array(value)
     if given.dtype.kind not in "buif" or given.shape not in ((2, 2), (3, 3)):
-        raise InvalidInput(f"matrix: must be numbers of shape (2, 2) or (3, 3), got {given.dtype} of {given.shape}")
+        raise InvalidInput(
+            f"matrix: must be numbers of shape (2, 2) or (3, 3), got {given.dtype} of shape {given.shape}"
+        )
     matrix = np.ascontiguousarray(given, np.float64)
     if not all(isfinite(v) for v in matrix.ravel().tolist()):
         raise InvalidInput("matrix: must be finite")

@@ -117,7 +117,7 @@ def check_arguments(
     if density is not None and (weights is not None or method is not None):
         other = "weights" if weights is not None else "method"
         raise InvalidInput(
-            f"density: cannot be combined with {other}, because it scatters elements over the first exemplar"
+            f"density: cannot be combined with {other}, because density scatters elements over the first exemplar"
         )
     as_choice(motion, "motion", ("auto", "move", "keep"))
     arguments = Arguments(
@@ -151,8 +151,8 @@ def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], element
         shapes = [e.shape for e in exemplars]
         if shapes != [elements.mask.shape]:
             raise InvalidInput(
-                f"elements: must have the shape of the only exemplar, got {elements.mask.shape} for {shapes}; "
-                "for several exemplars, pass each ElementAnalysis as exemplar"
+                f"elements: an ElementAnalysis of shape {elements.mask.shape} requires one exemplar of the same shape, got "
+                f"shapes {shapes}; for several exemplars, pass each ElementAnalysis as exemplar"
             )
         return ElementOptions(labels=part_at_borders(elements))
     plain = isinstance(elements, ElementOptions) and (elements.layers, elements.segmentation) == (None, "auto")
@@ -181,11 +181,11 @@ def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
         raise InvalidInput("exemplar: must contain at least one exemplar, got none")
     kinds = [(e.pixels.dtype.name, e.pixels.shape[-1]) for e in exemplars]
     if len(set(kinds)) > 1:
-        raise InvalidInput(f"exemplar: must have the same dtype and channels in all exemplars, got {kinds}")
+        raise InvalidInput(f"exemplar: all exemplars must have the same dtype and number of channels, got {kinds}")
     if isinstance(labels, list | tuple) and len(labels) != len(exemplars):
-        raise InvalidInput(f"labels: must be a list of {len(exemplars)}, one per exemplar, got {len(labels)}")
+        raise InvalidInput(f"labels: must be a list of {len(exemplars)} entries, one per exemplar, got {len(labels)}")
     if labels is not None and not isinstance(labels, list | tuple) and len(exemplars) > 1:
-        raise InvalidInput("labels: must be a list with one per exemplar if there are several exemplars")
+        raise InvalidInput("labels: must be a list with one entry per exemplar if there are several exemplars")
 
 
 def scale_together(exemplars: list[Exemplar]) -> list[Exemplar]:
@@ -209,16 +209,16 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
     if array.shape == size and np.asarray(weights).dtype.kind in "iu":
         if array.min() < 0 or array.max() >= count:
             raise InvalidInput(
-                f"weights: must be 0 to {count - 1} in a map of exemplars, got {array.min()} to {array.max()}"
+                f"weights: exemplar numbers must be integers from 0 to {count - 1}, got {array.min()} to {array.max()}"
             )
         return np.eye(count)[array.astype(np.intp)]
     if array.shape not in ((count,), (*size, count)):
         raise InvalidInput(
-            f"weights: must be {count} numbers (one per exemplar), integers of shape {size}, "
-            f"or numbers of shape {(*size, count)}; got shape {array.shape}"
+            f"weights: must be {count} numbers (one per exemplar), an integer array of shape {size}, "
+            f"or an array of shape {(*size, count)}; got shape {array.shape}"
         )
     if not np.isfinite(array).all() or array.min() < 0 or (array.sum(axis=-1) <= 0).any():
-        raise InvalidInput("weights: must be finite and not negative, with a positive sum in each pixel")
+        raise InvalidInput("weights: must be finite and at least 0, with a sum above 0 in each pixel")
     shares: NDArray[np.float64] = array / array.sum(axis=-1, keepdims=True)
     return shares
 
@@ -227,7 +227,8 @@ def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np
     """Return the checked densities of the exemplars after the first: (count - 1,) or (rows, columns, count - 1)."""
     if count < 2:
         raise InvalidInput(
-            "density: must have at least two exemplars, because elements of the others are scattered over the first; got one"
+            "density: requires at least two exemplars, because it scatters elements of the further exemplars over the "
+            "first; got one"
         )
     array = try_array(density, np.float64)
     if array.ndim == 0:
@@ -236,9 +237,9 @@ def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np
         array = np.repeat(array[..., np.newaxis], count - 1, axis=-1)
     if array.shape not in ((count - 1,), (*size, count - 1)):
         raise InvalidInput(
-            f"density: must be one number, {count - 1} numbers (one per exemplar after the first), or a map {size} or "
-            f"{(*size, count - 1)}; got shape {array.shape}"
+            f"density: must be one number, {count - 1} numbers (one per exemplar after the first), or an array of "
+            f"shape {size} or {(*size, count - 1)}; got shape {array.shape}"
         )
     if not np.isfinite(array).all() or array.min() < 0 or array.sum(axis=-1).max() > 1:
-        raise InvalidInput("density: must be shares of the area, 0 to 1, with a sum of at most 1")
+        raise InvalidInput("density: must be shares of the area from 0 to 1 whose sum is at most 1")
     return array

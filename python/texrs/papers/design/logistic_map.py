@@ -71,7 +71,7 @@ def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Itera
     first = list(islice(sizes, LOOKED_AT))
     if rate > PERIODIC and sum(a == b for a, b in pairwise(first)) >= STEADY:
         raise InvalidInput(
-            f"start: must not end in a fixed point of the logistic map, got {start!r}; take another start"
+            f"start: must not lead to a fixed point of the logistic map, got {start!r}; use another start"
         )
     return (255 * size for size in islice(chain(first, sizes), burn_in, None))
 

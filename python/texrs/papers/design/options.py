@@ -81,10 +81,10 @@ class DeformationOptions:
 
     def __post_init__(self) -> None:
         if not isinstance(self.scale, Sequence) or isinstance(self.scale, str) or len(self.scale) != 2:
-            raise InvalidInput(f"scale: must be (least, largest), got {self.scale!r}")
+            raise InvalidInput(f"scale: must be a pair (smallest, largest), got {self.scale!r}")
         low, high = (as_float(s, "scale", 0.5, 2) for s in self.scale)
         if low > high:
-            raise InvalidInput(f"scale: must have the least factor first, got {self.scale!r}")
+            raise InvalidInput(f"scale: must have the smallest factor first, got {self.scale!r}")
         values: dict[str, object] = {
             "operations": None if self.operations is None else as_int(self.operations, "operations", 0, 8),
             "translate": as_float(self.translate, "translate", 0, 0.5),

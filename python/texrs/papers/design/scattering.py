@@ -83,7 +83,7 @@ def find_scattered_elements(plan: Plan, number: int) -> list[Element]:
         found = [e for e in whole if SMALL * usual <= e.area <= LARGE * usual and e.distance.max() > 2 * EDGE]
     if not found:
         raise InvalidInput(
-            f"density: must have separate elements in exemplar {number}, but none are found ({plan.parts.reason}); "
+            f"density: exemplar {number} must have separate elements, but none were found ({plan.parts.reason}); "
             "mix it by weights, or mark its elements with the argument elements"
         )
     return found

@@ -34,8 +34,8 @@ def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> S
         if closed and across > 2 * float(np.abs(np.diff(turn, axis=axis)).max(initial=0.0)) + 0.02:
             name = ("rows", "columns")[axis]
             raise InvalidInput(
-                f"wrap: directions of the first and last {name} differ, so the result cannot repeat along {name}; "
-                f"make them equal, or leave wrap off along {name}"
+                f"wrap: the directions of the first and last {name} differ, so the result cannot repeat along {name}; "
+                f"make them equal, or omit wrap along {name}"
             )
     return turn
 
@@ -48,11 +48,11 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
     if given.ndim != 2 or given.dtype.kind not in "iuf" or given.size == 0:
         raise InvalidInput(
             "direction: must be one angle in degrees, an array (rows, columns) of angles, or a field; got "
-            f"{given.dtype} of {given.shape}"
+            f"{given.dtype} of shape {given.shape}"
         )
     angles = given.astype(np.float64)
     if not (np.abs(angles) <= FARTHEST).all():
-        raise InvalidInput(f"direction: must be finite angles from -{FARTHEST:g} to {FARTHEST:g} degrees")
+        raise InvalidInput(f"direction: all angles must be finite and from -{FARTHEST:g} to {FARTHEST:g} degrees")
     # Remove whole turns first, because the remainder of large angles would be rounded.
     angles = np.radians(angles % 360)
     parts = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

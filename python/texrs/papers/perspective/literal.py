@@ -53,7 +53,10 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
     if image.shape[-1] > 4:
         raise InvalidInput(f"exemplar: must have at most 4 channels for method='paper', got {image.shape[-1]}")
     if min(*image.shape[:2], *target.shape) < 2 * SIDE:
-        raise InvalidInput(f"size: must be at least {2 * SIDE} pixels a side for method='paper', got {target.shape}")
+        raise InvalidInput(
+            f"exemplar, size: each side must be at least {2 * SIDE} pixels for method='paper', got an exemplar of shape "
+            f"{image.shape[:2]} and a size of {target.shape}"
+        )
     made, coordinates, energies = average(
         image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress
     )

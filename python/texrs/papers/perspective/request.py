@@ -129,7 +129,7 @@ class Request:
         said = None if scale_kind is None else as_kind(scale_kind)
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
-            raise InvalidInput("fov: cannot be combined with a plane, which has its own")
+            raise InvalidInput("fov: cannot be combined with a plane, which has its own field of view")
         as_choice(target_green, "target_green", ("up", "down"))
         # The size of the target is the default size of the result.
         asked = as_target(target, target_green)
@@ -142,7 +142,8 @@ class Request:
         turn = None if direction is None else as_turn(direction, shape, closed)
         if method == "paper" and (surface is not None or turn is not None):
             raise InvalidInput(
-                "method: cannot be combined with surfaces or directions; give a scale map as target, or omit the method"
+                "method: 'paper' cannot be combined with a surface as target or with direction; omit method, or give a scale "
+                "map as target and omit direction"
             )
         # Determine the scale map, and resize the target to the size of the result.
         plane, scale, measured = find_scale(known, scale_map, scale_measurement)
@@ -192,14 +193,15 @@ def find_scale(
     """Return the plane of an exemplar or None, the size of its elements per pixel, and the measurement or None."""
     if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput(
-            "scale_measurement: cannot be combined with a scale map, because nothing is measured; omit one of them"
+            "scale_measurement: cannot be combined with a given scale_map, which is not measured; omit one of them"
         )
     if is_words(scale_map):
         scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
     if isinstance(scale_map, Plane):
         if scale_map.shape != exemplar.shape:
             raise InvalidInput(
-                f"scale_map: must be a plane in an image of {exemplar.shape}, like the exemplar, got {scale_map.shape}"
+                f"scale_map: a plane must belong to an image of shape {exemplar.shape}, like the exemplar, got "
+                f"{scale_map.shape}"
             )
         return scale_map, scale_map.scale_map(), None
     if not isinstance(scale_map, str):
@@ -224,7 +226,7 @@ def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: b
         if across > 2 * inner + 0.02:
             ratio = np.exp(np.abs(np.subtract(*log_single(np.take(target, [0, -1], axis).swapaxes(0, axis)))).max())
             name = ("rows", "columns")[axis]
-            way = "give a target that repeats" if stretched else "make it repeat"
+            way = "give a target that repeats" if stretched else "make the target repeat"
             raise InvalidInput(
                 f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}; {way}, or leave wrap off "
                 f"along {name}"

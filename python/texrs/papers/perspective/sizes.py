@@ -48,7 +48,9 @@ def check_sizes(asked: object) -> tuple[float, ...] | None:
         sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
         # Always include size 1, the exemplar itself.
         return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
-    raise InvalidInput(f"augment_scales: must be 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
+    raise InvalidInput(
+        f"augment_scales: must be 'auto', True, False or up to 16 scale factors from 1/8 to 4, got {asked!r}"
+    )
 
 
 def count_samples(scale: Floats, target: Floats) -> float:
@@ -73,8 +75,8 @@ class Outside:
         """Return the text of a warning about this part."""
         way = "; augment_scales='auto' adds resized copies" if len(sizes) == 1 else ""
         return (
-            f"target: {self.share:.1%} of it is outside the scales of the exemplar's copies, by a factor of up to "
-            f"{self.factor:.2f}, and was limited to these scales{way}"
+            f"target: {self.share:.1%} of the pixels are outside the scales of the exemplar's copies, by a factor of up to "
+            f"{self.factor:.2f}, and were limited to these scales{way}"
         )
 
 
@@ -85,7 +87,7 @@ def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple
     beyond = (target < low / slack) | (target > high * slack)
     if beyond.all():
         raise InvalidInput(
-            f"target: must be within {low:.3g} to {high:.3g}, the scales of the exemplar's copies, got "
+            f"target: some scales must be from {low:.3g} to {high:.3g}, the scales of the exemplar's copies, got "
             f"{target.min():.3g} to {target.max():.3g}; give other augment_scales"
         )
     factor = max(low / float(target.min()), float(target.max()) / high, 1.0)

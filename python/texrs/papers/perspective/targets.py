@@ -48,7 +48,7 @@ def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | st
         return as_jacobians(given, "target")
     if given.ndim == 3 and given.shape[2] in (2, 3):
         if given.shape[2] == 2 and given.dtype.kind != "f":
-            raise InvalidInput(f"target: coordinates (rows, columns, 2) must be floats, got {given.dtype}")
+            raise InvalidInput(f"target: coordinates of shape (rows, columns, 2) must be floats, got {given.dtype}")
         try:
             made = jacobians_of_coordinates(given) if given.shape[2] == 2 else jacobians_of_normals(given, green=green)
         except InvalidInput as error:
@@ -89,7 +89,7 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
     near = float(seen.width([[0, 0], [0, columns], [rows, 0], [rows, columns]]).min())
     if near < NEAREST:
         raise InvalidInput(
-            f"target: must not contain the horizon, but slant {seen.slant:g} with fov {seen.fov:g} degrees does; "
+            f"target: must not contain the horizon, but with slant {seen.slant:g} and fov {seen.fov:g} degrees it does; "
             "give a smaller slant or fov"
         )
     return seen.jacobians()
@@ -97,7 +97,9 @@ def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) ->
 
 def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
     """Return the plane that a text such as ``plane:slant=50,tilt=90,fov=60`` describes."""
-    form = f"{name}: must be plane:slant=DEGREES and, if known, tilt=, fov= and rotation=, separated by commas"
+    form = (
+        f"{name}: must be plane:slant=DEGREES with optional tilt=, fov= and rotation=, such as plane:slant=50,tilt=90"
+    )
     if not words.startswith(PREFIX):
         raise InvalidInput(f"{form}; got {words!r}")
     values: dict[str, float] = {}

@@ -55,7 +55,9 @@ class Endless(InParts):
         """Return the reader of a part, after checking that the part is within the allowed coordinates."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
         if any(o + n > MAX_COORDINATE for o, n in zip(start, sides, strict=True)):
-            raise InvalidInput(f"origin, shape: must be within {MAX_COORDINATE}, got {start} and {sides}")
+            raise InvalidInput(
+                f"origin, shape: the window must end at coordinates of at most {MAX_COORDINATE}, got {start} and {sides}"
+            )
         return Part(_Windows(self, start), start, IMAGE if self.material is None else self.material.base_name)
 
 

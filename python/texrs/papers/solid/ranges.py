@@ -33,7 +33,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
     """Return the region of an index, and True for each axis that a single number removes."""
     parts = index if isinstance(index, tuple) else (index,)
     if len(parts) != axes:
-        raise InvalidInput(f"texture: must have {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
+        raise InvalidInput(f"texture: must be indexed by {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
     origin, shape, single = [], [], []
     for part in parts:
         one = isinstance(part, numbers.Integral) and not isinstance(part, bool)
@@ -44,7 +44,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
                     f"got {_spell(part)}"
                 )
             if part.step is not None:
-                raise InvalidInput(f"texture: must have ranges without a step, got {_spell(part)}")
+                raise InvalidInput(f"texture: must be indexed by ranges without a step, got {_spell(part)}")
             start, stop = _as_end(part.start), _as_end(part.stop)
         elif one:
             start = _as_end(part)
@@ -53,10 +53,10 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
             raise InvalidInput(f"texture: must be indexed by integers and ranges, {_ORDER[axes]}; got {part!r}")
         if start is None or stop is None:
             raise InvalidInput(
-                f"texture: must have a range of integers from -{MAX_COORDINATE} to {MAX_COORDINATE}, got {_spell(part)}"
+                f"texture: must be indexed by integers from -{MAX_COORDINATE} to {MAX_COORDINATE}, got {_spell(part)}"
             )
         if stop <= start:
-            raise InvalidInput(f"texture: must not have an empty range, got {_spell(part)}")
+            raise InvalidInput(f"texture: must not be indexed by an empty range, got {_spell(part)}")
         origin.append(start)
         shape.append(stop - start)
         single.append(one)

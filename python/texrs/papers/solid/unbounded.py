@@ -326,7 +326,7 @@ class Texture(Endless):
         """
         if self._material is None:
             raise InvalidInput(
-                "texture: must be made from a material, got one made from an array; use sample() for its values"
+                "texture: must be created from a Material, but was created from an array; use sample() for its values"
             )
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
 
@@ -433,7 +433,9 @@ class Texture(Endless):
         The Jacobians are None if J is the identity.
         """
         if len(at) and np.abs(at).max() > MAX_COORDINATE:
-            raise InvalidInput(f"points: must be within {MAX_COORDINATE} of the origin, got {np.abs(at).max():g}")
+            raise InvalidInput(
+                f"points: coordinates must be from -{MAX_COORDINATE} to {MAX_COORDINATE}, got {np.abs(at).max():g}"
+            )
         places = np.empty(at.shape, np.float32)
         frames = None if self._field is None else np.empty((*at.shape, self.axes), np.float32)
         voxel = np.floor(at + 0.5).astype(np.int64)

@@ -118,8 +118,8 @@ from texrs.synthesis import Synthesis
 __all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
-NO_NET = "elements must have six knots or more, at least 8 pixels apart; take a larger image, or another box"
-NO_CELLS = "no reliable cells were found; give texrs.elements.analyse a box around one, or a mask of the joints"
+NO_NET = "elements must have at least six knots that are at least 8 pixels apart; use a larger image, or another box"
+NO_CELLS = "no reliable cells were found; give texrs.elements.analyse a box around one cell, or a mask of the joints"
 SCREENING = 0.01
 """Default weight of the original values in the colour correction.
 
@@ -291,10 +291,12 @@ def splice(
             as_bool(either, name)
     for name, asked in (("use_cells", wanted), ("use_nets", net)):
         if asked and method is not None:
-            raise InvalidInput(f'{name}: cannot be combined with method="{method}", which bends figures')
+            raise InvalidInput(
+                f'{name}: cannot be combined with method="{method}", which deforms connected textures instead'
+            )
     if wanted and net:
         raise InvalidInput(
-            "use_nets: cannot be combined with use_cells, because a texture is composed of cells or of knots"
+            "use_nets: cannot be combined with use_cells, because a texture is composed either of cells or of knots"
         )
     # Analyse the images only after all cheap checks of the arguments.
     watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)

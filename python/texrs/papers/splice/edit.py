@@ -56,7 +56,7 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
         unknown = sorted(map(str, set(given) - {"op", *allowed}))
         if unknown:
             raise InvalidInput(
-                f"edit: step {number}, {given['op']}, has no option {', '.join(unknown)}; must be one of {', '.join(allowed)}"
+                f"edit: step {number}, {given['op']}, has no option {', '.join(unknown)}; its options are {', '.join(allowed)}"
             )
         plain = dict(given)
         if plain["op"] == "randomise":
@@ -176,11 +176,13 @@ def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]
     """Replace the points by a list: in order if there is one place per element, else matched at the least cost."""
     listed = try_array(step.get("points"), np.float64)
     if listed.ndim != 2 or listed.shape[1] != 2 or not np.isfinite(listed).all():
-        raise InvalidInput("edit: points must be a list of finite [row, column]")
+        raise InvalidInput("edit: points must be a list of [row, column] pairs of finite numbers")
     if len(np.unique(listed, axis=0)) < len(listed):
-        raise InvalidInput("edit: points must not contain one place twice")
+        raise InvalidInput("edit: points must not contain the same position twice")
     if len(listed) > originals:
-        raise InvalidInput(f"edit: points must have at most {originals} places, one per element; got {len(listed)}")
+        raise InvalidInput(
+            f"edit: points must contain at most {originals} positions, one per element; got {len(listed)}"
+        )
     out = at.copy()
     of = np.arange(originals) if len(listed) == originals else match_points(at[:originals], listed)[0]
     kept[:originals] = False

@@ -61,7 +61,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
 
     """
     if not len(pins):
-        raise InvalidInput("elements: must have an element inside the image that can move")
+        raise InvalidInput("elements: must contain at least one element that is inside the image and can move")
     whole, step = rigid.shape, choose_coarseness(rigid.shape)
     if step > 1:
         rigid, pins = _downsample_mask(rigid, step), pins // step

@@ -40,7 +40,9 @@ def as_elements(value: object, name: str, progress: Progress) -> ElementAnalysis
         except LimitExceeded:
             raise
         except InvalidInput as error:
-            raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
+            raise InvalidInput(
+                f"{name}: {error}; to give a box, points or a mask, use texrs.elements.analyse"
+            ) from None
     return check_entry(value, name)
 
 
@@ -50,7 +52,7 @@ def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
     shape = image.shape[:2]
     mask = np.asarray(entry.mask)
     if mask.shape != shape or mask.dtype != np.bool_:
-        raise InvalidInput(f"{name}.mask: must be bool of shape {shape}, got {mask.dtype} {mask.shape}")
+        raise InvalidInput(f"{name}.mask: must be bool of shape {shape}, got {mask.dtype} of shape {mask.shape}")
     if mask.all() or not mask.any():
         raise InvalidInput(
             f"{name}.mask: must contain elements and background, got {'only' if mask.any() else 'no'} foreground"
@@ -58,14 +60,14 @@ def check_entry(entry: ElementAnalysis, name: str) -> ElementAnalysis:
     points = as_points(entry.points, (shape[0], shape[1]), f"{name}.points")
     if len(points) < FEWEST:
         raise InvalidInput(
-            f"{name}.points: must have at least three elements for a layout, got {len(points)}; "
+            f"{name}.points: must contain at least three elements for a layout, got {len(points)}; "
             "give a larger image, another box, or the points"
         )
     as_wrap(entry.wrap, f"{name}.wrap")
     known = entry.known
     if known is not None and (known.shape != shape or known.min() < 0 or not len(points) <= known.max() <= known.size):
         raise InvalidInput(
-            f"{name}.known: must be labels of shape {shape} from 1 to at least {len(points)}, one per point"
+            f"{name}.known: must be an array of labels of shape {shape}, with a label for each of the {len(points)} points"
         )
     return replace(entry, points=points)
 

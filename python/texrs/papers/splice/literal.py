@@ -58,7 +58,7 @@ def match_literally(a: ElementAnalysis, b: ElementAnalysis, size: tuple[int, int
 def _measure_mean_distance(points: Points) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
-        raise InvalidInput(f"elements: must have at least two elements for a layout, got {len(points)}")
+        raise InvalidInput(f"elements: must contain at least two elements for a layout, got {len(points)}")
     return float(nearest_distances(points, count).mean())
 
 

@@ -148,14 +148,14 @@ def match_layouts(
         for angle in turns
     ]
     if not all(len(wanted) for wanted in asked):
-        raise InvalidInput("layout: must have a point inside the output")
+        raise InvalidInput("layout: must have at least one point inside the output")
     # Extend A until it has enough elements for every rotation, and use the cheapest rotation.
     most = max(len(wanted) for wanted in asked)
     extension = _extend_until(a, size, unit, SPARE * most)
     if len(extension.points) < most:
         raise InvalidInput(
-            f"elements: must give at least {most} elements for this size, got {len(extension.points)}; "
-            "take a smaller size or a larger image"
+            f"elements: must provide at least {most} elements for this size, got {len(extension.points)}; "
+            "use a smaller size or a larger image"
         )
     best: Match | None = None
     for angle, wanted in zip(turns, asked, strict=True):
@@ -369,7 +369,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
     cuts.
     """
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
-        raise InvalidInput(f"edit: remove must be used with separate elements, got {a.layout.value} ones")
+        raise InvalidInput(f"edit: remove requires separate elements, got {a.layout.value} elements")
     points = list_element_points(a)
     trial = apply_steps(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")

@@ -73,7 +73,7 @@ def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
         raise InvalidInput(
-            f"size: must show at least {FEWEST} elements for the edit, got {len(entry.points)} at {size}"
+            f"size: must be large enough for the {FEWEST} elements that an edit requires, got {len(entry.points)} in {size}"
         )
     return entry
 

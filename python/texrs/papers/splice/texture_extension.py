@@ -234,7 +234,7 @@ def _stamp(
     if inside is not None:
         stray &= ~inside
     if not kept:
-        raise InvalidInput("elements: must have whole elements, but the border cuts every one")
+        raise InvalidInput("elements: must contain at least one whole element, but the border cuts every element")
     chosen = np.array(kept)
     # Number the stray pieces of foreground after the elements, and compute their centres.
     pieces, count = label(stray)

@@ -96,7 +96,7 @@ def continue_cells(
     """
     usable = np.flatnonzero(cells.whole | (cells.area >= NEARLY * cells.size**2))
     if len(usable) < 3:
-        raise InvalidInput(f"layout: must have at least three whole cells, got {len(usable)}; take a larger image")
+        raise InvalidInput(f"layout: must have at least three whole cells, got {len(usable)}; use a larger image")
     scale = 1 / cells.size
     centre = (np.array(cells.labels.shape) - 1) / 2
     reach = np.array(far) / scale
@@ -186,7 +186,7 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
             break
     if not best.any():
         raise InvalidInput(
-            "layout: must have cells that can be continued over the output; take a smaller size or a larger image"
+            "layout: its cells cannot be continued over the whole output; use a smaller size or a larger image"
         )
     outlines = trace(best, np.arange(1, int(best.max()) + 1))
     return (outlines - (np.array(size) - 1) / 2) / unit

@@ -135,7 +135,7 @@ def take_points(
     box = [(side * (middle + margin + 2 * wide)) / factor + origin for side in (-1, 1)]
     wanted, continued = continue_points(layout, shape, box[0], box[1])
     if not len(wanted):
-        raise InvalidInput("layout: must have a point inside the output")
+        raise InvalidInput("layout: must have at least one point inside the output")
     points = (wanted - origin) * factor + middle + margin
     shape = (size[0] + 2 * margin, size[1] + 2 * margin)
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)

@@ -92,7 +92,7 @@ def take_points(
     points, continued = continue_points(layout, b.mask.shape, low, high)
     points = (points - centre) * factor + middle
     if len(points) < 3:
-        raise InvalidInput("layout: must have at least three points around the output; take a larger size")
+        raise InvalidInput("layout: must have at least three points in and around the output; use a larger size")
     return Targets(points, factor, continued)
 
 
