@@ -182,7 +182,7 @@ def test_a_material_takes_labels_without_a_role_and_says_so(tmp_path: Path, caps
     out = tmp_path / "out"
     words = ["design", str(place), "--size", "64x64", "-o", str(out), "--stages", str(tmp_path / "s")]
     assert main([*words, "--role", "rock_small=mask"]) == 2
-    assert "must all have one size" in capsys.readouterr().err
+    assert "must all have the same size" in capsys.readouterr().err
     (place / "rock_small.png").unlink()
     assert main(words) == 0
     assert "read as labels" in json.loads((tmp_path / "s" / "report.json").read_text())["assumed"][0]

@@ -265,7 +265,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("tile uneven -o new", "uneven: must all have one size, but height has"),
         ("design rock -o links", "is an input (rock/rock_albedo.png), and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is an input"),
-        ("design empty -o new", "empty: no image has a name that gives its role"),
+        ("design empty -o new", "empty: no image has a name that indicates its role"),
     ],
 )
 def test_nothing_is_lost_and_nothing_half_written(

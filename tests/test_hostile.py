@@ -175,7 +175,7 @@ def test_maps_of_no_shape_are_refused(shape):
         (lambda: texrs.SourceMap.from_selection([], np.zeros((1, 2), np.uint8), np.zeros((1, 2), np.uint32)), "maps: "),
         (
             lambda: texrs.SourceMap.from_selection([MAP], np.full((1, 2), 6, np.uint8), np.zeros((1, 2), np.uint32)),
-            "place: must be below 6",
+            "place: values must be below 6",
         ),
         (lambda: texrs.SourceMap.from_selection([MAP], np.zeros((1, 2)), np.zeros((1, 2), np.uint32)), "place: "),
         (

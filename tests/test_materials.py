@@ -213,7 +213,7 @@ def test_what_names_do_not_say_is_left_out_and_said(tmp_path: Path) -> None:
     (tmp_path / "licence.txt").write_text("CC0")
     with pytest.warns(UserWarning, match=r"rock_preview\.png not used"):
         assert list(Material.read(tmp_path)) == ["rock_albedo"]
-    with pytest.raises(InvalidInput, match="one size"):
+    with pytest.raises(InvalidInput, match="same size"):
         Material.read(tmp_path, roles={"rock_preview.png": "mask"})
     with pytest.raises(InvalidInput, match="roles: must name images in .*got 'rock'"):
         Material.read(tmp_path, roles={"rock": "mask"})
@@ -228,8 +228,8 @@ def test_bad_materials_are_refused() -> None:
     picture = STONES["albedo"].pixels
     for maps, options, words in (
         ({}, {}, "maps: must be a mapping"),
-        ({"thing": picture}, {}, "thing: the name does not give the role"),
-        ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: must all have one size, but height has"),
+        ({"thing": picture}, {}, "thing: the name does not indicate the role"),
+        ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: must all have the same size, but height has"),
         ({"normal": picture[..., 0]}, {}, "normal: a map of role normal must have 2, 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "must be one of"),
         ({"albedo": picture}, {"roles": {"colour": "mask"}}, "roles: must name maps (albedo), got 'colour'"),
@@ -245,7 +245,7 @@ def test_bad_materials_are_refused() -> None:
         texrs.design([STONES, picture], 64)
     with pytest.raises(InvalidInput, match="the same maps"):
         texrs.design([STONES, Material({"albedo": picture})], 64)
-    with pytest.raises(InvalidInput, match="must have equal types of the map 'albedo'"):
+    with pytest.raises(InvalidInput, match="the map 'albedo' must have the same role"):
         texrs.design([Material({"albedo": picture}), Material({"albedo": picture.astype(np.uint16)})], 64)
 
 

@@ -161,7 +161,7 @@ def test_shrunk_values_are_means_of_areas() -> None:
         ({"light": (0, 0)}, r"light\[1\]: must be a number between 1 and 90"),
         ({"light": (0, 45, 3)}, "light"),
         ({"side": 0}, "side"),
-        ({"side": 2, "tiles": (1, 3)}, "side: must be larger, because 2 pixels cannot show 3 tiles"),
+        ({"side": 2, "tiles": (1, 3)}, "side: must be at least the number of tiles, got 2 pixels for 3 tiles"),
     ],
 )
 def test_bad_options_are_refused(options: dict[str, Any], words: str) -> None:

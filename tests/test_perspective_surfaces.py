@@ -101,10 +101,10 @@ def test_coordinates_may_jump_and_end():
 @pytest.mark.parametrize(
     ("work", "words"),
     [
-        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4, 3))), "normals: no pixel shows a surface"),
+        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4, 3))), "normals: must contain a surface"),
         (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4))), "normals: must be numbers of shape"),
         (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: must be one of up, down"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: no pixel shows a surface"),
+        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: must contain a surface"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: must have at least two rows"),
         (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: must have shape"),
     ],
@@ -266,7 +266,7 @@ def test_a_column_that_repeats(weave):
         ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but with slant 80"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: matrices must have scales of .* 64 of 64 do not"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
-        ({"target": np.zeros((8, 8, 3))}, "target: normals: no pixel shows a surface"),
+        ({"target": np.zeros((8, 8, 3))}, "target: normals: must contain a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* must be floats"),
         ({"target": np.ones((8, 8, 3, 3))}, "target: must have shape"),
         ({"target": make_column(8), "method": "paper"}, "method: 'paper' cannot be combined with a surface"),

@@ -252,8 +252,12 @@ def test_128_is_the_normal_size_and_the_ends_hold() -> None:
 @pytest.mark.parametrize(
     ("image", "encoding", "message"),
     [
-        (np.ones((4, 4)), "log2", r"^image: must be grey levels in uint8 or uint16, got float64; floats are scales"),
-        (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: must be grey levels, got colours; a false-colour"),
+        (
+            np.ones((4, 4)),
+            "log2",
+            r"^image: must contain grey levels of dtype uint8 or uint16, got float64; floats need",
+        ),
+        (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: must contain grey levels, got colours; a false-colour"),
         (np.ones((4, 4), np.uint8), "log10", r"^encoding: must be one of log2, paper; got 'log10'$"),
     ],
 )

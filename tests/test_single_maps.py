@@ -72,7 +72,7 @@ def test_values_must_agree_with_the_name(here: Path, capsys: pytest.CaptureFixtu
     capsys.readouterr()
     assert main(["tile", "photo_normal.png", "-o", "named.png"]) == 0
     said = capsys.readouterr().err
-    assert "photo_normal.png: read as colours, because its values are not those of the role normal" in said
+    assert "photo_normal.png: read as colours, because its values do not match the role normal" in said
     assert "normals without z" not in said
     assert (io.read("named.png") == io.read("plain.png")).all()
 

@@ -115,7 +115,7 @@ def test_source_maps_are_looked_up_lazily() -> None:
     assert np.array_equal(turned.compute(), made.source_map.render(normals, map_type="normal", interpolation="nearest"))
     plain = texrs.design(WEAVE, 96, seed=2)
     assert np.array_equal(plain.source_map.to_dask(WEAVE, 50).compute(), plain.stages["before_blending"])
-    with pytest.raises(InvalidInput, match="exemplars: number 0 must have size"):
+    with pytest.raises(InvalidInput, match="exemplars: exemplar 0 must have size"):
         made.source_map.to_dask(WEAVE[:-1])
 
 

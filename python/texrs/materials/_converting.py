@@ -66,7 +66,7 @@ def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
     most = WHOLE if dtype.kind == "f" else np.iinfo(dtype).max
     low, high = pixels.min(), pixels.max()
     if high > most or low < (-WHOLE if dtype.kind == "f" else 0):
-        raise InvalidInput(f"{name}: must be labels from 0 to {most} to be written as {dtype}, got {low} to {high}")
+        raise InvalidInput(f"{name}: labels must be from 0 to {most} to be written as {dtype}, got {low} to {high}")
     return pixels.astype(dtype)
 
 

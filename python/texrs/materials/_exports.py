@@ -160,7 +160,7 @@ class Exports(Mapping[str, Map]):
         if convention is not None:
             as_convention(convention, "convention")
             if pack is not None:
-                raise InvalidInput("pack: cannot be combined with convention, which has its own packings")
+                raise InvalidInput("pack: cannot be combined with convention, which defines the packing")
             return arrange_maps(self, convention, self.axes)
         if pack is None:
             return self
@@ -314,4 +314,4 @@ class Exports(Mapping[str, Map]):
 
     def _check_flat(self) -> None:
         if self.axes != 2:
-            raise InvalidInput("material: must not be a volume; use slices of it")
+            raise InvalidInput("material: must not be a volume; write slices of it instead")

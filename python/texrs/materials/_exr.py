@@ -190,7 +190,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
     # Report the layers that are not used, and what was assumed about the others.
     lines = [f"{show_names(names)} not used: {why}" for why, names in left.items()]
     if not maps:
-        raise FileError(f"{path}: no layer has a name that gives its role; give roles ({'; '.join(lines)})")
+        raise FileError(f"{path}: no layer has a name that indicates its role; give roles ({'; '.join(lines)})")
     for line in lines:
         ignore(f"{path}: {line}")
     if any(each.role.coloured for each in maps.values()):

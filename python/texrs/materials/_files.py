@@ -71,7 +71,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
         left["the name gives no role"] = unknown
         lines = "; ".join(describe_unused(left))
         raise FileError(
-            f"{path}: no image has a name that gives its role, such as albedo.png; give roles"
+            f"{path}: no image has a name that indicates its role, such as albedo.png; give roles"
             f"{f' ({lines})' if lines else ''}"
         )
     if len(taken) > MOST:
@@ -190,7 +190,7 @@ def report_colours(file: Path, notes: io.Metadata, space: Space) -> None:
         stated.append(f"the gamma {notes.gamma:.3g}")
     if stated and not notes.srgb:
         verb = "are" if len(stated) > 1 or "primaries" in stated[0] else "is"
-        ignore(f"{file}: {' and '.join(stated)} {verb} not used: colours of maps are read and written as sRGB")
+        ignore(f"{file}: {' and '.join(stated)} {verb} not used, because colours of maps are read and written as sRGB")
 
 
 def name_profile(profile: bytes) -> str | None:
@@ -213,7 +213,7 @@ def list_places(path: Path | Sequence[Path]) -> tuple[Path, list[FilePath]]:
         return cast(Path, path), list(folder.iterdir())
     several = [as_path(each) for each in path]
     if not several or len({each.parent for each in several}) > 1:
-        raise InvalidInput(f"path: must be files of one folder, got {', '.join(map(str, several)) or 'an empty list'}")
+        raise InvalidInput(f"path: must be files in one folder, got {', '.join(map(str, several)) or 'an empty list'}")
     for each in several:
         if not each.is_file():
             raise FileError(f"{each}: does not exist")

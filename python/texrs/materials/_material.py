@@ -96,11 +96,11 @@ class Material(Exports):
         axes: int = 2,
     ) -> None:
         if not isinstance(maps, Mapping) or not maps:
-            raise InvalidInput("maps: must be a mapping of names to arrays, with at least one")
+            raise InvalidInput("maps: must be a mapping of names to arrays, with at least one entry")
         self._axes = as_int(axes, "axes", 2, 3)
         for option, given in (("roles", roles), ("spaces", spaces), ("weights", weights)):
             if given is not None and not isinstance(given, Mapping):
-                raise InvalidInput(f"{option}: must be a mapping by the names of maps, got {given!r}")
+                raise InvalidInput(f"{option}: must be a mapping whose keys are names of maps, got {given!r}")
         said, how, share = dict(roles or {}), dict(spaces or {}), dict(weights or {})
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
@@ -118,7 +118,7 @@ class Material(Exports):
         for name, size in sizes.items():
             if size != self._shape:
                 raise InvalidInput(
-                    f"maps: must all have one size, but {name} has {size} and {next(iter(sizes))} has {self._shape}"
+                    f"maps: must all have the same size, but {name} has {size} and {next(iter(sizes))} has {self._shape}"
                 )
         with collect() as settled:
             report_guesses(why, guessed, said)
@@ -141,7 +141,7 @@ class Material(Exports):
             assume(f"{name}: read as {REASON}")
         if chosen is None:
             raise InvalidInput(
-                f"{name}: the name does not give the role of the map; give roles, such as {name!r}: 'other'"
+                f"{name}: the name does not indicate the role of the map; give roles, such as {name!r}: 'other'"
             )
         allowed = CHANNELS.get(chosen)
         if allowed is not None and image.shape[-1] not in allowed:
@@ -520,4 +520,7 @@ def check_alike(materials: Sequence[Material]) -> None:
             theirs = other[name]
             mine, its = ((m.role.value, str(m.pixels.dtype), m.channels) for m in (each, theirs))
             if mine != its:
-                raise InvalidInput(f"exemplars: must have equal types of the map {name!r}, got {mine} and {its}")
+                raise InvalidInput(
+                    f"exemplars: the map {name!r} must have the same role, dtype and channels in all materials, got "
+                    f"{mine} and {its}"
+                )

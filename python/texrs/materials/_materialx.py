@@ -56,7 +56,7 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
     if Role.NORMAL in chosen:
         chosen.pop(Role.NORMAL_DX, None)
     if not chosen:
-        raise InvalidInput(f"material: must have a map of a surface, got {', '.join(maps)}")
+        raise InvalidInput(f"material: must have a map that describes a surface, such as albedo, got {', '.join(maps)}")
     names = {name: rename(name, maps[name].role) for name in chosen.values()}
     chosen = {role: names[name] for role, name in chosen.items()}
     stored = {f"{target.stem}_{new}": prepare(name, maps, depth) for name, new in names.items()}

@@ -52,7 +52,9 @@ def render_preview(
     first = next(iter(maps.values())).pixels
     rows, columns = first.shape[:2]
     if most < max(down, right):
-        raise InvalidInput(f"side: must be larger, because {most} pixels cannot show {max(down, right)} tiles")
+        raise InvalidInput(
+            f"side: must be at least the number of tiles, got {most} pixels for {max(down, right)} tiles"
+        )
     scale = min(1.0, most / max(rows * down, columns * right))
     shape = max(1, int(rows * scale)), max(1, int(columns * scale))
     slopes = measure_slopes(maps, (down > 1, right > 1))

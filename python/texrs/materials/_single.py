@@ -39,7 +39,7 @@ def read_single(path: str) -> SingleMap | None:
             return None
     each = next(iter(read.values()))
     if not _agrees(each.pixels, each.role):
-        assume(f"{path}: read as colours, because its values are not those of the role {role.value} of its name")
+        assume(f"{path}: read as colours, because its values do not match the role {role.value} of its name")
         return None
     for line in notices.ignored:
         ignore(line)

@@ -85,7 +85,7 @@ def auto_mask(
     colours = guidance(pixels)
     if float(colours[there].std(axis=0).max()) < _FLAT:
         raise InvalidInput(
-            "image: must have more than one colour, to show features; give the scale by a mask or by angles"
+            "image: must contain visible features, but has a single colour; give the scale by a mask or by angles"
         )
     grey = take_grey(colours, there)
     # Detail below `fine` is ignored, so work on cells of half this size. Large images then cost less.
@@ -109,7 +109,7 @@ def _measure(mask: Bools, trend: Trend, known: Bools) -> Floats:
         return from_mask(mask, trend=trend, known=known)
     except InvalidInput:
         raise InvalidInput(
-            "image: has too few features to count; use a larger part of the texture, or give the scale by a mask or by "
+            "image: must contain more features; use a larger part of the texture, or give the scale by a mask or by "
             "angles"
         ) from None
 

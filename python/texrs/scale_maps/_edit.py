@@ -109,7 +109,7 @@ def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:
     if not isinstance(steps, Sequence) or isinstance(steps, str | bytes):
         raise InvalidInput(f"steps: must be a list of steps, got {type(steps).__name__}")
     if len(steps) > _MOST:
-        raise InvalidInput(f"steps: must be at most {_MOST} steps, got {len(steps)}")
+        raise InvalidInput(f"steps: must contain at most {_MOST} steps, got {len(steps)}")
     return [_read(one, number) for number, one in enumerate(steps, start=1)]
 
 
@@ -123,7 +123,7 @@ def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
     for key in options:
         if key not in allowed:
             raise InvalidInput(
-                f"steps: step {number}, {operation}, has no option {key}; must be one of {', '.join(allowed)}"
+                f"steps: step {number}, {operation}, has no option {key}; its options are {', '.join(allowed)}"
             )
     for parameter in parameters:
         if parameter.default is parameter.empty and parameter.name not in options:
@@ -160,7 +160,7 @@ def _ramp(
 ) -> Floats:
     first, last = as_points([start], "start")[0], as_points([end], "end")[0]
     if not isinstance(values, list | tuple) or len(values) != 2:
-        raise InvalidInput(f"values must be two scales, at the start and at the end, got {values!r}")
+        raise InvalidInput(f"values must be two scales, one at the start and one at the end, got {values!r}")
     low, high = (np.log(as_number(v, "values", _LEAST, _LARGEST)) for v in values)
     along = last - first
     length = float(along @ along)
@@ -175,16 +175,18 @@ def _duplicate(logs: Floats, region: object, to: object, mode: object = "copy", 
     if mode not in ("copy", "ratio"):
         raise InvalidInput(f"mode must be 'copy' or 'ratio', got {mode!r}")
     if region is None:
-        raise InvalidInput("region must be a part of the map, got None")
+        raise InvalidInput("region must be given, got None")
     step = np.rint(as_points([to], "to")[0] - centre(region)).astype(int)
     inside = weights(region, feather, logs.shape)
     if not inside.any():
-        raise InvalidInput(f"region must be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels")
+        raise InvalidInput(f"region must overlap the map of {logs.shape[0]} x {logs.shape[1]} pixels")
     # Copy only the part whose source is inside the map. The rest of the target does not change.
     there = [slice(max(0, d), min(n, n + d)) for d, n in zip(step, logs.shape, strict=True)]
     here = [slice(max(0, -d), min(n, n - d)) for d, n in zip(step, logs.shape, strict=True)]
     if any(s.stop <= s.start for s in there):
-        raise InvalidInput(f"to must be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels, got {to}")
+        raise InvalidInput(
+            f"to must place a part of the region inside the map of {logs.shape[0]} x {logs.shape[1]} pixels, got {to}"
+        )
     source, share = logs[tuple(here)], inside[tuple(here)]
     part = logs[tuple(there)]
     result = logs.copy()

@@ -98,12 +98,12 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     check_memory(8 * given.size, "image")
     if given.dtype not in (np.uint8, np.uint16):
         raise InvalidInput(
-            f"image: must be grey levels in uint8 or uint16, got {given.dtype}; floats are scales already"
+            f"image: must contain grey levels of dtype uint8 or uint16, got {given.dtype}; floats need no decoding"
         )
     # Ignore alpha: only the colour channels must be equal.
     grey = given[..., : 3 if given.shape[2] >= 3 else 1]
     if (grey != grey[..., :1]).any():
-        raise InvalidInput("image: must be grey levels, got colours; a false-colour image cannot be decoded")
+        raise InvalidInput("image: must contain grey levels, got colours; a false-colour image cannot be decoded")
     levels = grey[..., 0].astype(np.float32)
     if given.dtype == np.uint16:
         levels /= 257

@@ -36,13 +36,13 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
     """
     given = as_array(value, name, np.float64, ("rows", "columns", 2, 2))
     if not np.isfinite(given).all():
-        raise InvalidInput(f"{name}: must be finite, got {np.count_nonzero(~np.isfinite(given))} values that are not")
+        raise InvalidInput(f"{name}: must be finite, but {np.count_nonzero(~np.isfinite(given))} values are not")
     flat = find_flat(given)
     if flat.any():
         row, column = (int(i) for i in np.argwhere(flat)[0])
         raise InvalidInput(
             f"{name}: matrices must have scales of {MIN_SCALE} to {MAX_SCALE:.0f} and a foreshortening of at most {WORST:g}; "
-            f"{np.count_nonzero(flat)} of {flat.size} do not, first ({row}, {column})"
+            f"{np.count_nonzero(flat)} of {flat.size} do not, the first at ({row}, {column})"
         )
     return np.asarray(given, np.float64)
 
@@ -109,7 +109,9 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     given = try_array(normals)
     check_memory(8 * given.size, "normals")
     if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "uif" or 0 in given.shape:
-        raise InvalidInput(f"normals: must be numbers of shape (rows, columns, 3), got {given.dtype} of {given.shape}")
+        raise InvalidInput(
+            f"normals: must be numbers of shape (rows, columns, 3), got {given.dtype} of shape {given.shape}"
+        )
     up = as_choice(green, "green", ("up", "down")) == "up"
     vectors, blank = given.astype(np.float64), (given == 0).all(axis=-1)
     # Decode normal maps to -1 to 1. Unit vectors without negative components are not encoded.
@@ -120,7 +122,7 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     length = np.sqrt((vectors * vectors).sum(axis=-1))
     there = np.isfinite(length) & (length > 1e-3) & ~blank
     if not there.any():
-        raise InvalidInput("normals: no pixel shows a surface, because all are zero or NaN")
+        raise InvalidInput("normals: must contain a surface, but all pixels are zero or NaN")
     unit = np.where(there[..., np.newaxis], vectors / np.where(there, length, 1)[..., np.newaxis], 0.0)
     x, y = unit[..., 0], unit[..., 1] if up else -unit[..., 1]
     away = np.sqrt(x * x + y * y)
@@ -181,7 +183,7 @@ def jacobians_of_coordinates(coordinates: Array) -> Jacobians:
     there = there & ~find_flat(np.where(there[..., np.newaxis, np.newaxis], slopes, 0.0))
     if not there.any():
         raise InvalidInput(
-            "coordinates: no pixel shows a surface, because all are NaN or without a different neighbour"
+            "coordinates: must contain a surface, but each pixel is NaN or has the coordinates of its neighbours"
         )
     if there.all():
         return slopes

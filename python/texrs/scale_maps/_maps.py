@@ -29,7 +29,9 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
         raise InvalidInput(f"{name}: must have shape (rows, columns), got {given.shape}; a scale map has one channel")
     flat = given[..., 0]
     if given.dtype.kind != "f":
-        raise InvalidInput(f"{name}: must be floats, got {given.dtype}; convert an encoded image by scale_maps.decode")
+        raise InvalidInput(
+            f"{name}: must be floats, got {given.dtype}; convert an encoded image with scale_maps.decode"
+        )
     if shape is not None and flat.shape != tuple(shape):
         raise InvalidInput(
             f"{name}: must have shape {tuple(shape)}, got {flat.shape}; use scale_maps.resample to resize a map"

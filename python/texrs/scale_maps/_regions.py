@@ -30,7 +30,7 @@ def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
     if points.ndim != 2 or points.shape[1] != 2 or not least <= len(points) <= MAX_POINTS:
         raise InvalidInput(f"{name} must be {least} to {MAX_POINTS} points [row, column], got {_shorten(value)}")
     if not (np.abs(points) <= _FARTHEST).all():
-        raise InvalidInput(f"{name} must be points within {_FARTHEST:g} pixels, got {_shorten(value)}")
+        raise InvalidInput(f"{name} must have coordinates from -{_FARTHEST:g} to {_FARTHEST:g}, got {_shorten(value)}")
     return points
 
 
@@ -53,7 +53,7 @@ def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
         top, left, bottom, right = shape
         if bottom <= top or right <= left:
             raise InvalidInput(
-                f"region must be [top, left, bottom, right] with top < bottom, left < right, got {region}"
+                f"region must be [top, left, bottom, right] with top < bottom and left < right, got {region}"
             )
         dy, dx = (
             np.abs(at - (low + high - 1) / 2) - (high - low) / 2

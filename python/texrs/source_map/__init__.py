@@ -162,7 +162,7 @@ class SourceMap(Parted):
         if not isinstance(coordinates, np.ndarray) or coordinates.shape[-1:] not in ((2,), (3,)):
             what = getattr(coordinates, "shape", type(coordinates).__name__)
             raise InvalidInput(
-                f"coordinates: must be an array (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
+                f"coordinates: must have shape (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
             )
         sides = coordinates.shape[:-1]
         check_memory(8 * coordinates.size, "coordinates")
@@ -269,12 +269,12 @@ class SourceMap(Parted):
         several = [as_ndarray(e, "exemplars", axes=self.axes) for e in as_list(exemplars)]
         if len(several) != len(self.shapes):
             raise InvalidInput(
-                f"exemplars: must be {len(self.shapes)}, as many as the map was made from, got {len(several)}"
+                f"exemplars: must be the {len(self.shapes)} exemplars of the source map, got {len(several)}"
             )
         images = [as_image(e, "exemplars", axes=self.axes) for e in several]
         for i, (image, shape) in enumerate(zip(images, self.shapes, strict=True)):
             if image.shape[: self.axes] != shape:
-                raise InvalidInput(f"exemplars: number {i} must have size {shape}, got {image.shape[: self.axes]}")
+                raise InvalidInput(f"exemplars: exemplar {i} must have size {shape}, got {image.shape[: self.axes]}")
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
         if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
@@ -287,7 +287,8 @@ class SourceMap(Parted):
             or green not in ("up", "down")
         ):
             raise InvalidInput(
-                f"map_type, green: must be one of colour, normal, vector, slope, and of up, down; got {map_type!r}, {green!r}"
+                f"map_type, green: must be one of colour, normal, vector, slope, and one of up, down; got "
+                f"{map_type!r}, {green!r}"
             )
         # Look for negative values in the exemplars, because the sampled part may not contain any.
         bare = map_type == "normal" and self.axes == 2 and not stores_z(images)
@@ -328,7 +329,9 @@ class SourceMap(Parted):
         # Stop at the first entry that is not a map, because an iterable may be endless.
         maps: list[SourceMap] = [as_instance(each, "inner", SourceMap) for each in several]
         if tuple(m.shape for m in maps) != self.shapes:
-            raise InvalidInput(f"inner: must have outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
+            raise InvalidInput(
+                f"inner: the outputs of the maps must have sizes {self.shapes}, got {[m.shape for m in maps]}"
+            )
         if any(m.shapes != maps[0].shapes for m in maps):
             raise InvalidInput("inner: all maps must have the same exemplars")
         # Find the inner pixel nearest to each position, and keep the rest of the position for J_inner.
@@ -390,19 +393,23 @@ class SourceMap(Parted):
         # Use the values of masked arrays, without their masks.
         place, label = (np.asarray(v) if isinstance(v, np.ndarray) else v for v in (place, label))
         if not several:
-            raise InvalidInput("maps: must have at least one entry, got none")
+            raise InvalidInput("maps: must contain at least one source map, got none")
         if any(each.shapes != several[0].shapes for each in several):
-            raise InvalidInput("maps: must have exemplars of the same sizes")
+            raise InvalidInput("maps: all maps must have exemplars of the same sizes")
         for name, value in (("place", place), ("label", label)):
             if not isinstance(value, np.ndarray) or value.dtype.kind != "u" or value.ndim not in (2, 3):
-                what = f"{value.dtype} of {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+                what = (
+                    f"{value.dtype} of shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+                )
                 raise InvalidInput(f"{name}: must be an array of unsigned integers with 2 or 3 axes, got {what}")
         if label.shape != place.shape or label.dtype != np.uint32:
-            raise InvalidInput(f"label: must be uint32 of shape {place.shape}, got {label.dtype} of {label.shape}")
+            raise InvalidInput(
+                f"label: must be uint32 of shape {place.shape}, got {label.dtype} of shape {label.shape}"
+            )
         count = sum(math.prod(each.shape) for each in several)
         if place.size and int(np.asarray(place).max()) >= count:
             raise InvalidInput(
-                f"place: must be below {count}, the number of pixels of all maps, got {int(place.max())}"
+                f"place: values must be below {count}, the number of pixels of all maps, got {int(place.max())}"
             )
         return cls(*Pixels.chain(several).pick(place, label, out=label if overwrite else None), several[0].shapes)
 

@@ -56,7 +56,7 @@ def read_map(path: Path, make: type[Map]) -> Map:
 
     parts = read_arrays(path, choose=choose)
     if parts["texrs_source_map"].ravel().tolist() != [FORMAT]:
-        raise FileError(f"{path}: has a file layout other than {FORMAT}, the layout that this version of texrs reads")
+        raise FileError(f"{path}: must have file layout {FORMAT}, the only layout that this version of texrs reads")
     try:
         shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
         rest = (parts["label"], parts.get("jacobian", parts.get("frame")), shapes)
@@ -101,5 +101,5 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
         if headers[name].size > most[name]:
             raise FileError(f"{path}: is damaged ({name} of {headers[name].dtype}, shape {headers[name].shape})")
     if sum(headers[name].size for name in known) > limit:
-        raise LimitExceeded(f"{path}: its masks of exemplars have more than {limit} pixels")
+        raise LimitExceeded(f"{path}: the masks of its exemplars have more pixels than the limit of {limit}")
     return [*chosen, *known]

@@ -164,15 +164,19 @@ class RenderOptions:
             raise InvalidInput(f"finish: known must be masks of shapes {shapes}")
         apart = parts.get("finish/parts")
         if apart is not None and (apart.shape != shape or apart.dtype != np.uint16):
-            raise InvalidInput(f"finish: parts must be uint16 of shape {shape}, got {apart.dtype} of {apart.shape}")
+            raise InvalidInput(
+                f"finish: parts must be uint16 of shape {shape}, got {apart.dtype} of shape {apart.shape}"
+            )
         if within is not None and within.shape != shape:
             raise InvalidInput(f"finish: within must be a mask of shape {shape}, got {within.shape}")
         fade = parts.get("finish/fade")
         if fade is not None and ((fade.shape, *shapes[:1]) != (shape, shape) or fade.dtype != np.uint8):
-            raise InvalidInput(f"finish: fade must be uint8 of shape {shape}, which must be that of the first exemplar")
+            raise InvalidInput(
+                f"finish: fade must be uint8 of shape {shape}, and the first exemplar must have the same shape"
+            )
         light = words["light"]
         if light is not None and not (isinstance(light, list) and len(light) == 2):
-            raise InvalidInput("finish: light must be a row and a column")
+            raise InvalidInput("finish: light must be a list [row, column]")
         screening, band = words["screening"], words["band"]
         return cls(
             tuple(as_bool(w, "wrap") for w in words["wrap"]),

@@ -57,18 +57,23 @@ class Parted(ABC):
         ):
             extent = array.shape[:-1] if name == "coordinates" else array.shape
             if array.dtype != dtype or extent != shape:
-                raise InvalidInput(f"{name}: must be {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
+                raise InvalidInput(
+                    f"{name}: must be {np.dtype(dtype)} for an output of shape {shape}, got "
+                    f"{array.dtype} of shape {array.shape}"
+                )
         # Check for a field last, because checking a protocol takes as long as all other checks together.
         if isinstance(self.jacobian, np.ndarray):
             table = self.jacobian.ndim == 3
             wanted = self.jacobian.shape[:1] if table else shape
             if self.jacobian.dtype != np.float32 or self.jacobian.shape != (*wanted, axes, axes):
                 raise InvalidInput(
-                    f"jacobian: must be float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.jacobian.shape}"
+                    f"jacobian: must be float32 of shape (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got "
+                    f"{self.jacobian.dtype} of shape {self.jacobian.shape}"
                 )
             if table and self.label.size and int(self.label.max()) >= len(self.jacobian):
                 raise InvalidInput(
-                    f"jacobian: must have a matrix for each label up to {int(self.label.max())}, got {len(self.jacobian)}"
+                    f"jacobian: must have a matrix for each label up to {int(self.label.max())}, got "
+                    f"{len(self.jacobian)} matrices"
                 )
         elif self.jacobian is not None:
             if not isinstance(self.jacobian, Frames):
@@ -78,10 +83,10 @@ class Parted(ABC):
             if self.jacobian.axes != axes:
                 raise InvalidInput(f"jacobian: must be a field with {axes} axes like the map, got {self.jacobian.axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
-            raise InvalidInput(f"shapes: each must have {axes} sides, integers of at least 1, got {self.shapes}")
+            raise InvalidInput(f"shapes: each shape must consist of {axes} integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(np.asarray(self.exemplar).max()) >= len(self.shapes):
             raise InvalidInput(
-                f"exemplar: must be below {len(self.shapes)}, the number of shapes, got {int(self.exemplar.max())}"
+                f"exemplar: values must be below {len(self.shapes)}, the number of shapes, got {int(self.exemplar.max())}"
             )
 
     @property
@@ -150,7 +155,7 @@ class Parted(ABC):
             )
         )
         if not fits:
-            raise InvalidInput(f"box: must be {self.axes} ranges within {self.shape}, got {box!r}")
+            raise InvalidInput(f"box: must be {self.axes} ranges inside the output of shape {self.shape}, got {box!r}")
         jacobian = self.jacobian
         if isinstance(jacobian, Frames):
             origin = [s.start or 0 for s in box]
