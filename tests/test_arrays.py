@@ -216,7 +216,9 @@ def test_what_is_masked_is_a_hole():
     for verb in (texrs.tile, texrs.design, texrs.Exemplar, texrs.elements.analyse):
         with pytest.raises(InvalidInput, match=r": 672 of 12288 values are masked; texrs.inpaint"):
             verb(known)
-    with pytest.raises(InvalidInput, match="mask: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image"):
+    with pytest.raises(
+        InvalidInput, match="mask: must be a mask, 'alpha', 'nan', 'nodata' or a number, unless the image"
+    ):
         texrs.inpaint(PEBBLES)
 
 

@@ -265,7 +265,7 @@ def test_apply_is_all_or_nothing(here: Path, capsys: Capture) -> None:
     Path("results/in.png").touch()
     before = files(here)
     for maps, out, words in (
-        ("in.png small.png", "results", "small.png: number 0 must have size"),
+        ("in.png small.png", "results", "small.png: exemplar 0 must have size"),
         ("in.png small.png", "one.png", "must be an existing folder"),
         ("in.png", ".", "--out: ./in.png is an input (in.png), and would be lost"),
         ("in.png other/in.png", "results", "two maps have the name in.png"),

@@ -39,7 +39,7 @@ def test_a_tile_is_left_as_it_is(folder, capsys):
     ]
     assert main(["tile", "tile.png", "-o", "again.png"]) == 0
     said = capsys.readouterr().err
-    assert "tiles already along the rows and columns, which are not changed" in said
+    assert "is already tileable along the rows and columns, which are not changed" in said
     assert "100% of the pixels in place" in said
     np.testing.assert_array_equal(io.read("tile.png"), io.read("again.png"))
 

@@ -262,7 +262,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock -o mine", "mine/rock_albedo.png exists"),
         ("design same -o same", "--out: same is an input, and would contain other maps"),
         ("tile rock -o new --mipmaps links/../rock", "rock is an input, and would contain other maps"),
-        ("tile uneven -o new", "uneven: must all have one size, but height has"),
+        ("tile uneven -o new", "uneven: must all have the same size, but height has"),
         ("design rock -o links", "is an input (rock/rock_albedo.png), and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is an input"),
         ("design empty -o new", "empty: no image has a name that indicates its role"),

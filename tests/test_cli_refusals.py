@@ -119,15 +119,15 @@ SIZES = {
     "rectify in.png --slant 20 --tilt 90 --fov 50 --size 30000x20000": "--size: 30000 x 20000 has",
     "solid volume.tif --size 3000x2000x1000": "--size: 3000 x 2000 x 1000 has",
     "extend in.png --slant 0 --size 30000x20000": "--size: 30000 x 20000 has",
-    "extend in.png --slant 0 --size 10x5000": "--size: must be at least 96 x 64 pixels, and at most 16384 more",
+    "extend in.png --slant 0 --size 10x5000": "--size: must be at least 96 x 64 pixels, and at most 16384 pixels larger",
     "inpaint in.png small-mask.png": "small-mask.png: must have shape 96 x 64, got 30 x 40",
     "remove in.png small-mask.png --slant 0": "small-mask.png: must have shape 96 x 64, got 30 x 40",
-    "apply map.npz small.png": "small.png: number 0 must have size 96 x 64, got 30 x 40",
+    "apply map.npz small.png": "small.png: exemplar 0 must have size 96 x 64, got 30 x 40",
     "design tiny.png": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "splice tiny.png sample:dots": "tiny.png: each side must be at least 16, got shape 12 x 8",
     "design in.png --element-labels small-mask.png": "small-mask.png: must be integers of shape 96 x 64, got uint8 30 x 40",
     "design in.png in.png --density small-mask.png": "array of shape 192 x 128 or 192 x 128 with 1 channel; got shape 30 x 40",
-    "slice volume.tif --oblique 99,99,99/1,1,0": "--oblique: must give a cut through the volume",
+    "slice volume.tif --oblique 99,99,99/1,1,0": "--oblique: must specify a slice that crosses the volume",
     "extend in.png --slant 0": "--top, --bottom, --left, --right: at least one must be above 0",
 }
 

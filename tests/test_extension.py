@@ -81,7 +81,7 @@ def test_a_plane_goes_on_away_from_a_horizon_that_is_seen() -> None:
 
 
 def test_a_doubtful_plane_is_not_followed() -> None:
-    with pytest.warns(UserWarning, match="not followed"):
+    with pytest.warns(UserWarning, match="not used"):
         made = texrs.extend(look_twice(), bottom=16, seed=1)
     assert made.report["planes"] == [{"plane": None, "found": False}]
     assert np.abs(np.abs(np.linalg.det(made.source_map.jacobians())) - 1).max() < 1e-6

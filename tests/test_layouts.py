@@ -210,7 +210,7 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     ("make", "words"),
     [
         (lambda: layouts.points([[1, 2], [3, 4]], 64), "places: must be between 3"),
-        (lambda: layouts.points([[1, 2], [3, 4], [5, 99]], 64), "places: must be inside the size"),
+        (lambda: layouts.points([[1, 2], [3, 4], [5, 99]], 64), "places: must be inside a layout of size"),
         (lambda: layouts.points([[1, 2], [3, 4], [1, 2]], 64), "places: must be different"),
         (lambda: layouts.points([[1, 2], [3, 4], [5, np.nan]], 64), "places: must be finite"),
         (lambda: layouts.points("no", 64), "places: must be finite"),
@@ -218,7 +218,7 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         (lambda: layouts.lattice(64, (0, 8), (0, 9)), "second: must not be parallel to first"),
         (lambda: layouts.lattice(64, (0, 8), (8,)), "second: must be two finite numbers"),
         (lambda: layouts.lattice(64, (0, 0.1), (0.1, 0)), "first, second: must give at most"),
-        (lambda: layouts.lattice(64, (0, 800), (800, 0)), "must contain at least 3 points"),
+        (lambda: layouts.lattice(64, (0, 800), (800, 0)), "must be large enough for at least 3 points"),
         (lambda: layouts.cells(np.ones((64, 64), int)), "labels: must contain at least three elements"),
         (lambda: layouts.cells(np.ones((64, 64, 3), int)), "labels: must have shape .H, W."),
         (lambda: layouts.cells(np.full((64, 64), 0.5)), "labels: must be integers"),

@@ -260,9 +260,9 @@ def test_directions_lie_in_the_surface_as_they_are_said(tmp_path: Path) -> None:
         (lambda: texture_mesh(BALL, TEXTURE, scale=0), InvalidInput, "scale"),
         (lambda: texture_mesh(BALL, TEXTURE, atlas=4), InvalidInput, "atlas"),
         (lambda: texture_mesh("nowhere.obj", TEXTURE), FileError, "nowhere.obj"),
-        (lambda: field_on_surface(BALL, "north", scale=1), InvalidInput, r"directions: must be an axis \(x, y, z"),
+        (lambda: field_on_surface(BALL, "north", scale=1), InvalidInput, "directions: must be an axis such as x"),
         (lambda: field_on_surface(BALL, "curvature:some", scale=1), InvalidInput, "must be one of curvature"),
-        (lambda: field_on_surface(BALL, "[]", scale=1), InvalidInput, "must contain strokes"),
+        (lambda: field_on_surface(BALL, "[]", scale=1), InvalidInput, "must contain at least one stroke"),
         (
             lambda: field_on_surface(BALL, [[[0, 0, 1]]], scale=1),
             InvalidInput,

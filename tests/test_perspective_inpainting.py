@@ -190,7 +190,7 @@ def test_an_output_that_wraps(floor):
         ({"scale_map": "guess"}, "scale_map: must be 'auto'"),
         ({"scale_map": np.ones((3, 3))}, "scale_map: must have shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
-        ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: must be combined with an exemplar"),
+        ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: requires exemplar"),
         (
             {
                 "scale_map": np.ones((64, 64)),
@@ -205,13 +205,13 @@ def test_an_output_that_wraps(floor):
         ),
         (
             {"mask": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
-            "scale_map: 'auto' needs known pixels",
+            "scale_map: 'auto' requires known pixels",
         ),
         ({"screening": "soft"}, "screening: must be a number"),
         ({"mask": "alpha"}, "mask: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "patch_size": 12}, "patch_size: cannot be combined with method='optimise'"),
-        ({"method": "optimise", "mask": np.ones((64, 64), bool)}, "mask: covers the whole image"),
-        ({"method": "optimise", "mask": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "mask: leaves no part"),
+        ({"method": "optimise", "mask": np.ones((64, 64), bool)}, "mask: must leave pixels to copy from"),
+        ({"method": "optimise", "mask": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "mask: must leave a larger part"),
     ],
 )
 def test_bad_input_is_named(options, sentence):

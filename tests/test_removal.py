@@ -223,7 +223,7 @@ def test_a_doubtful_plane_is_said_and_not_followed() -> None:
     noise[:48] = noise[:48] // 2
     marked = np.zeros((96, 96), bool)
     marked[50:60, 50:60] = True
-    with pytest.warns(UserWarning, match="not followed"):
+    with pytest.warns(UserWarning, match="not used"):
         made = texrs.remove(noise, marked)
     assert made.report["planes"][0]["plane"] is None
 
@@ -271,7 +271,10 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: must be a texrs.PlaneView"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: must mark at least one"),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED), "allowed: must mark known pixels"),
+        (
+            lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED),
+            "allowed: must mark at least one pixel outside the hole",
+        ),
         (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: cannot be combined"),
         (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: cannot be combined"),
     ],

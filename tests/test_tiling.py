@@ -331,8 +331,8 @@ def test_smallest_pictures(shape):
     ("options", "words"),
     [
         ({"overlap": 0}, "overlap: must be an integer between 1 and 20, got 0"),
-        ({"overlap": 21}, "between 1 and 20, got 21: at most half of the 40 rows"),
-        ({"overlap": (4, 26)}, "between 1 and 25, got 26: at most half of the 50 columns"),
+        ({"overlap": 21}, "between 1 and 20, got 21 (at most half of the 40 rows)"),
+        ({"overlap": (4, 26)}, "between 1 and 25, got 26 (at most half of the 50 columns)"),
         ({"overlap": 2.5}, "overlap: must be an integer"),
         ({"overlap": (3, 4, 5)}, "overlap: must be one number or"),
         ({"overlap": "8"}, "overlap: must be an integer"),
@@ -367,7 +367,7 @@ def test_images_are_checked(image, words):
 
 
 def test_a_few_pixels_are_not_extended():
-    with pytest.raises(InvalidInput, match="if a side has fewer than 8 pixels, got 40"):
+    with pytest.raises(InvalidInput, match="if the image has a side below 8 pixels, got 40"):
         texrs.tile(np.zeros((7, 60), np.uint8), size=40)
 
 

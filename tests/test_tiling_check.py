@@ -174,7 +174,7 @@ def test_pixel_art_that_tiles_comes_back():
     np.testing.assert_array_equal(made.image, image)
     assert made.report["already"] == ["rows", "columns"]
     assert made.report["in_place"] == 1
-    assert "image: tiles already along the rows and columns, which are not changed" in made.report["assumed"]
+    assert "image: is already tileable along the rows and columns, which are not changed" in made.report["assumed"]
 
 
 @pytest.mark.parametrize("name", ["pebbles", "beans", "bricks", "grit", "scales"])

@@ -143,7 +143,8 @@ def extend(
     missing = [n - m for n, m in zip(sides, _add_sizes((rows, columns), added), strict=True)]
     if min(missing) < 0 or max(missing) > 2 * MOST:
         raise InvalidInput(
-            f"size: must be at least {_add_sizes((rows, columns), added)} pixels, and at most {2 * MOST} more, got {sides}"
+            f"size: must be at least {_add_sizes((rows, columns), added)} pixels, and at most {2 * MOST} pixels larger, "
+            f"got {sides}"
         )
     if sides == (rows, columns):
         raise InvalidInput("top, bottom, left, right: at least one must be above 0")

@@ -73,16 +73,18 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     shape, around = _as_shape(size), as_wrap(wrap, "wrap")
     at = try_array(places, np.float64)
     if at.ndim != 2 or at.shape[1] != 2 or not np.isfinite(at).all():
-        raise InvalidInput(f"places: must be finite (row, column), shape (n, 2), got {at.dtype} {at.shape}")
+        raise InvalidInput(
+            f"places: must be finite (row, column) pairs of shape (n, 2), got {at.dtype} of shape {at.shape}"
+        )
     at = np.asarray(at, np.float64)
     if not 3 <= len(at) <= MOST:
         raise InvalidInput(f"places: must be between 3 and {MOST} points, got {len(at)}")
     # Points may be half a pixel beyond the centres of border pixels, because pixels extend that far.
     outside = ((at < -0.5) | (at > np.array(shape) - 0.5)).any(axis=1)
     if outside.any():
-        raise InvalidInput(f"places: must be inside the size {shape}, got {at[outside][0].tolist()}")
+        raise InvalidInput(f"places: must be inside a layout of size {shape}, got {at[outside][0].tolist()}")
     if len(np.unique(at, axis=0)) < len(at):
-        raise InvalidInput("places: must be different, got a place twice")
+        raise InvalidInput("places: must be different, got the same place twice")
     return _draw_points(at, shape, (around[0], around[1]))
 
 
@@ -130,7 +132,9 @@ def lattice(
             f"second: must not be parallel to first, {tuple(basis[0].tolist())}, got {tuple(basis[1].tolist())}"
         )
     if np.prod(shape) / area > MOST:
-        raise InvalidInput(f"first, second: must give at most {MOST} points in {shape}; use longer vectors")
+        raise InvalidInput(
+            f"first, second: must give at most {MOST} points in a layout of size {shape}; use longer vectors"
+        )
     middle = (np.array(shape) - 1) / 2 if origin is None else np.array(_as_pair(origin, "origin"))
     # The coordinates of the corners in the basis bound the indices of all visible points.
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)]) - middle
@@ -140,7 +144,7 @@ def lattice(
     at = np.round(index.reshape(-1, 2) @ basis + middle, 6)
     at = at[((at >= 0) & (at <= np.array(shape) - 1)).all(axis=1)]
     if len(at) < 3:
-        raise InvalidInput(f"size: must contain at least 3 points of this lattice, got {len(at)} in {shape}")
+        raise InvalidInput(f"size: must be large enough for at least 3 points of the lattice, got {len(at)} in {shape}")
     return _draw_points(at, shape, (False, False))
 
 
@@ -243,7 +247,9 @@ def courses(
     spread = as_float(vary, "vary", 0, 0.9)
     wide = as_float(joint, "joint", 0, min(*heights, long * (1 - spread), 1e6) / 2)
     if shape[0] / min(heights) * (shape[1] / long + 2) > MOST:
-        raise InvalidInput(f"height, length: must give at most {MOST} bricks in {shape}; use larger ones")
+        raise InvalidInput(
+            f"height, length: must give at most {MOST} bricks in a layout of size {shape}; use larger bricks"
+        )
     noise, labels = np.random.default_rng(number), np.zeros(shape, np.int32)
     rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
     # Label the courses from the top. Each course begins up to one brick to the left of the drawing.
@@ -291,7 +297,7 @@ def from_dict(description: Mapping[str, Any]) -> ElementAnalysis:
 
     if not isinstance(description, Mapping) or description.get("layout") not in _MADE:
         raise InvalidInput(
-            f"layout: must be a mapping whose 'layout' is one of {', '.join(_MADE)}; got {description!r}"
+            f"layout: must be a mapping whose entry 'layout' is one of {', '.join(_MADE)}; got {description!r}"
         )
     function = _MADE[description["layout"]]
     given = {str(name): value for name, value in description.items() if name != "layout"}

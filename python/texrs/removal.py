@@ -159,7 +159,7 @@ def remove(
     inner = widen(marked, wide)
     hole = widen(inner, asked.feather)
     if hole.all():
-        raise InvalidInput("mask: must leave pixels to copy from, but covers the whole photograph with its margin")
+        raise InvalidInput("mask: must leave pixels to copy from, but with its margin it covers the whole photograph")
     check_work("remove", [pixels], shape, "image")
     watch("plane", 0.0)
     with answering(progress, "plane", 0.0):

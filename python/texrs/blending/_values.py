@@ -60,7 +60,9 @@ class Samples:
         if high <= low:
             return None
         if not math.isfinite(high - low):
-            raise InvalidInput(f"exemplars: must have a range of values of less than 1.8e308, got {low:g} to {high:g}")
+            raise InvalidInput(
+                f"exemplars: the range of their values must be less than 1.8e308, got {low:g} to {high:g}"
+            )
         return cls(
             [_scale(e[..., :channels], low, high) for e in exemplars],
             low,

@@ -489,7 +489,9 @@ class TextureDatabase:
     def _find_record(self, name: str) -> Record:
         found = self._folder.read()
         if not isinstance(name, str) or name not in found:
-            there = ", ".join(sorted(found)[:8]) or "none"
+            if not found:
+                raise InvalidInput(f"name: texture {name!r} is not in {self.path}, because the database is empty")
+            there = ", ".join(sorted(found)[:8]) + (", ..." if len(found) > 8 else "")
             raise InvalidInput(f"name: texture {name!r} is not in {self.path}; must be one of {there}")
         return found[name]
 

@@ -218,9 +218,7 @@ def inpaint(
             progress=progress,
         )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
-        raise InvalidInput(
-            "exemplar_scale_map: must be combined with an exemplar, and with a scale_map in the same units"
-        )
+        raise InvalidInput("exemplar_scale_map: requires exemplar, and scale_map in the same units")
     if scale_kind is not None and scale_map is None:
         raise InvalidInput("scale_kind: has no effect without scale_map; give scale_map or omit scale_kind")
     said = None if scale_kind is None else as_kind(scale_kind)
@@ -323,10 +321,12 @@ def _check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
     if allowed is None:
         return ~open_
     if not fits:
-        raise InvalidInput("allowed: cannot be combined with an exemplar or method 'optimise'")
+        raise InvalidInput("allowed: cannot be combined with exemplar or method='optimise'")
     usable: Bools = as_mask(allowed, "allowed", open_.shape) & ~open_
     if not usable.any():
-        raise InvalidInput("allowed: must mark known pixels, because there is nothing else to copy from")
+        raise InvalidInput(
+            "allowed: must mark at least one pixel outside the hole, because only marked pixels are copied"
+        )
     return usable
 
 
@@ -351,7 +351,7 @@ def _check_pictures(array: Array, mask: Bools, open_: Bools, exemplar: object | 
     pixels = as_image(array, "image", minimum=LEAST)
     if exemplar is None:
         if open_.all():
-            raise InvalidInput("mask: covers the whole image, so there is nothing to copy from; give an exemplar")
+            raise InvalidInput("mask: must leave pixels to copy from, but covers the whole image; give an exemplar")
         return [pixels.reshape(array.shape)]
     known = as_exemplar(exemplar, minimum=LEAST)
     other = known.pixels

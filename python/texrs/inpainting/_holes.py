@@ -41,7 +41,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     marks, shape = mask.marks, pixels.shape[:axes]
     alpha, worded = _is_alpha(marks), is_value(marks)
     if worded and mask.threshold is not None:
-        raise InvalidInput("threshold: must be given with a mask that is an image, or with 'alpha'")
+        raise InvalidInput("threshold: requires a mask that is an image, or 'alpha'")
     if alpha:
         hole = adjust(mask, _mark_transparent(pixels, axes, mask.threshold), wrap)
     elif worded:
@@ -57,9 +57,7 @@ def check_material(given: dict[str, Any]) -> None:
     """Refuse a hole that is defined by the values of one image if there are several maps."""
     marks = as_marks(given.get("mask")).marks
     if _is_alpha(marks) or is_value(marks):
-        raise InvalidInput(
-            "mask: must be a mask, because the image is a material, and one hole applies to all its maps"
-        )
+        raise InvalidInput("mask: must be a mask image for a material, because the same hole applies to all its maps")
 
 
 def _is_alpha(marks: object) -> bool:
@@ -94,7 +92,7 @@ def _mark_transparent(pixels: Array, axes: int, threshold: float | None) -> Bool
         hole &= ~(alpha > (1 - threshold) * full)
     elif hole.all():
         assume(
-            "image: no pixel is fully opaque, so all are filled; with a threshold of 1 only fully transparent ones are"
+            "image: no pixel is fully opaque, so all are filled; a threshold of 1 fills only fully transparent pixels"
         )
     if not hole.any():
         raise InvalidInput("mask: no pixel of the image is transparent, so there is nothing to fill")
@@ -108,7 +106,9 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
     path, stated = _find_nodata(image) if marks in (None, "nodata") else ("", None)
     if marks == "nodata" and stated is None:
         known = (
-            f"{path} states no nodata value" if path else "'nodata' needs an image of a file, which states the value"
+            f"{path} does not contain a nodata value"
+            if path
+            else "'nodata' requires an image that was read from a file"
         )
         raise InvalidInput(f"mask: {known}; give the value, or 'nan'")
     value = math.nan if marks == "nan" else stated if marks in (None, "nodata") else _as_number(marks)
@@ -117,7 +117,7 @@ def _mark_missing(image: object, pixels: Array, marks: object, masked: Bools | N
     if marks is None:
         if masked is None and not missing.any():
             raise InvalidInput(
-                "mask: must be a mask, 'alpha', 'nan', 'nodata' or a number; or the image must be a masked array or hold NaN"
+                "mask: must be a mask, 'alpha', 'nan', 'nodata' or a number, unless the image is a masked array or contains NaN"
             )
         if missing.any():
             what = "NaN or infinite" if stated is None else f"without data ({stated:g}), NaN or infinite"

@@ -49,7 +49,7 @@ def recover_scale(
         if given != "auto":
             raise InvalidInput(f"{name}: must be 'auto', a map or None, got {given!r}")
         if not known.any():
-            raise InvalidInput(f"{name}: 'auto' needs known pixels, and the hole covers the whole image; pass a map")
+            raise InvalidInput(f"{name}: 'auto' requires known pixels, but the hole covers the whole image; pass a map")
         found = measure_known_scale(picture, known)
         return found.scale, found
     scale, holds = try_array(given), find_kind(given) or scale_kind
@@ -79,7 +79,7 @@ def optimise(
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
-            raise InvalidInput(f"{name}: must have at least {LEAST} pixels a side for method 'optimise', got {shape}")
+            raise InvalidInput(f"{name}: must have at least {LEAST} pixels per side for method='optimise', got {shape}")
     levels = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
     # Pad the image by the radius of a window at the coarsest level, so that windows of pixels at its border stay
     # inside the atlas.
@@ -124,11 +124,9 @@ def _make_atlas(
     atlas = Atlas.of(guidance(ground), scale, sizes, levels=levels, wanted=wanted, known=free)
     if not atlas.usable:
         why = (
-            "mask: leaves no part of the image that is free"
-            if len(pictures) == 1
-            else "exemplar: has no part large enough"
+            "mask: must leave a larger part of the image" if len(pictures) == 1 else "exemplar: must have a larger part"
         )
-        raise InvalidInput(f"{why} to copy from; method='patch' may find one")
+        raise InvalidInput(f"{why} to copy from; or use method='patch', which copies smaller parts")
     return atlas
 
 

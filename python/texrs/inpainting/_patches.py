@@ -226,8 +226,8 @@ def check_places(free: Bools, side: int) -> None:
     """Refuse a patch size without any place to copy from."""
     if not mark_corners(free, side).any():
         fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
-        hint = f"the largest that does is {fits}" if fits else "no other size does; give an exemplar"
-        raise InvalidInput(f"patch_size: {side} does not fit anywhere in the image without holes; {hint}")
+        hint = f"the largest size that fits is {fits}" if fits else "no other size fits; give an exemplar"
+        raise InvalidInput(f"patch_size: a patch of side {side} does not fit into the image outside the holes; {hint}")
 
 
 def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
@@ -244,5 +244,7 @@ def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return [side]
     if not mark_corners(free, LEAST).any():
-        raise InvalidInput(f"mask: must leave {LEAST} x {LEAST} connected pixels to copy from; give an exemplar")
+        raise InvalidInput(
+            f"mask: must leave a square of {LEAST} x {LEAST} known pixels to copy from; or give an exemplar"
+        )
     return [LEAST]

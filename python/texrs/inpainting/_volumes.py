@@ -83,7 +83,7 @@ def is_volume(image: object, hole: object) -> bool:
             return os.path.exists(image) and holds_volume(image)
         if deep:
             assume(
-                f"image: {' x '.join(map(str, sides))} is read as a volume; a mask of two axes would make it an image"
+                f"image: {' x '.join(map(str, sides))} is read as a volume; with a mask of two axes, it is read as an image"
             )
         return deep
     if isinstance(marks, str | os.PathLike):
@@ -174,7 +174,7 @@ def check_volume(image: object, hole: object) -> tuple[Array, Bools]:
     pixels, mask = find_hole(image, asked, (False,) * 3, axes=3)
     volume = pixels.copy()
     if mask.all():
-        raise InvalidInput("mask: covers the whole volume, so there is nothing to copy from")
+        raise InvalidInput("mask: must leave voxels to copy from, but covers the whole volume")
     volume[mask] = volume[np.unravel_index(mask.argmin(), mask.shape)]
     as_image(volume, "image", axes=3, minimum=LEAST)
     check_memory(24 * mask.size, "image")
@@ -340,7 +340,8 @@ def stitch(
     laid = shown < len(made.frames)
     if hole[tuple(np.moveaxis(found, -1, 0))].any():
         raise InvalidInput(
-            f"mask: leaves too few known voxels around it for patches of {side}; pass a smaller patch_size, at least 6"
+            f"mask: must leave more known voxels around the hole for patches of side {side}; pass a "
+            "smaller patch_size, at least 6"
         )
     places[part], label[part] = found, np.where(laid, shown + 1, 0)
     return places, label, made.frames, made.seams

@@ -91,7 +91,7 @@ def field_on_surface(
     size, count = as_float(scale, "scale", 1e-9, 1e9), as_int(resolution, "resolution", 8, 200)
     longest = float(np.ptp(vertices, axis=0).max())
     if not longest > 0:
-        raise InvalidInput("mesh: must have an extent, but all vertices are at one point")
+        raise InvalidInput("mesh: must have an extent, but all vertices are at the same point")
     points, normals = _scatter(vertices, faces, longest / count)
     near = _find_neighbours(points, normals)
     kind, _, rest = directions.partition(":") if isinstance(directions, str) else ("", "", "")
@@ -261,8 +261,8 @@ def _read_axis(text: str, whole: str) -> Floats64:
         axis = np.zeros(0)
     if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
         raise InvalidInput(
-            "directions: must be an axis (x, y, z, or numbers such as 1,0,1), around: and an axis, curvature, curvature:least, "
-            f"or strokes in .json; got {whole!r}"
+            "directions: must be an axis such as x or 1,0,1, around:AXIS, curvature, curvature:least, or a .json file of "
+            f"strokes; got {whole!r}"
         )
     return np.asarray(axis / np.sqrt((axis**2).sum()))
 
@@ -295,7 +295,7 @@ def _read_strokes(given: Any) -> list[Floats64]:
             raise InvalidInput(f"{where}: stroke {number} must have at least two points [x, y, z]")
         strokes.append(line)
     if not strokes:
-        raise InvalidInput(f"{where}: must contain strokes, each a list of points [x, y, z]")
+        raise InvalidInput(f"{where}: must contain at least one stroke, which is a list of points [x, y, z]")
     return strokes
 
 

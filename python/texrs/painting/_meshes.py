@@ -29,7 +29,9 @@ def unwrap(
     try:
         import xatlas
     except ImportError:
-        raise InvalidInput("mesh: has no UVs; computing them needs the extra: pip install texrs[mesh]") from None
+        raise InvalidInput(
+            "mesh: has no UVs; to compute them, install the package xatlas: pip install texrs[mesh]"
+        ) from None
     maker, how = xatlas.Atlas(), xatlas.PackOptions()
     flat: Floats = vertices.astype(np.float32)
     maker.add_mesh(flat, faces.astype(np.uint32))

@@ -70,7 +70,9 @@ def _read_file(path: FilePath) -> Surface:
     try:
         import trimesh
     except ImportError:
-        raise InvalidInput("mesh: reading a file needs the extra: pip install texrs[mesh]") from None
+        raise InvalidInput(
+            "mesh: files other than .obj require the package trimesh; install it with: pip install texrs[mesh]"
+        ) from None
     try:
         if suffix in (".glb", ".gltf"):
             scene = trimesh.load_scene(

@@ -65,8 +65,8 @@ def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | 
         return None, False
     if seen.confidence < SURE:
         warnings.warn(
-            f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not followed; give the corners "
-            "of a rectangle of it, or slant and tilt",
+            f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not used; give the corners "
+            "of a rectangle on it, or slant and tilt",
             stacklevel=4,
         )
         return None, False
@@ -126,9 +126,9 @@ def measure_known_scale(pixels: Array, known: Bools) -> ScaleEstimate:
     """Return the size of elements at each pixel of an image; warn if it is uncertain."""
     found = measure_scale(pixels, known=known)
     if found.confidence < SURE:
-        why = "the measurements have little in common, so all elements are assumed to be equally large"
+        why = "the measured sizes do not agree, so all elements are assumed to be equally large"
         if found.shape != "even":
-            why = "the image is too small for several measurements, so sizes are those of light areas"
+            why = "the image is too small for several measurements, so the sizes of light areas are used"
         warnings.warn(
             f"scale_map: no plane was found with confidence, and {why} (confidence {found.confidence:.2f} of 1); if the "
             "result is wrong, give a map",

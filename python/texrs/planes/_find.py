@@ -104,7 +104,9 @@ def find(image: object, *, fov: float | None = None, known: object = None) -> Pl
     if there.sum() < SMALLEST**2 / 4:
         raise InvalidInput(f"known: must mark at least {SMALLEST**2 // 4} pixels of the plane, got {int(there.sum())}")
     if float(colours[there].std(axis=0).max()) < 1e-4:
-        raise InvalidInput("image: must contain a texture, got one colour; give the corners or angles of the plane")
+        raise InvalidInput(
+            "image: must contain a texture, but has a single colour; give the corners or angles of the plane"
+        )
     grey, there, step = prepare(colours, there)
     rise, confidence = look(grey, there, find_focal(grey.shape, angle) / max(grey.shape))
     # Keep six digits, because later digits of a fit depend on the processor.

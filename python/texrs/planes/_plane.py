@@ -306,7 +306,7 @@ class Plane:
         """
         if not isinstance(given, Mapping) or not {"shape", "slant"} <= set(given) <= set(cls.__dataclass_fields__):
             raise InvalidInput(
-                f"plane: must be a mapping with shape, slant, tilt, fov, rotation and confidence, got {given!r}"
+                f"plane: must be a mapping with shape, slant and optional tilt, fov, rotation, confidence, got {given!r}"
             )
         return cls(**given)
 
@@ -336,10 +336,10 @@ class Plane:
         """Return the plane of a horizon: coefficients of a line in (row, column, 1), from the middle of the image."""
         scale = np.linalg.norm(line[:2]) * max(size) + abs(line[2])
         if not np.isfinite(line).all() or scale == 0:
-            raise InvalidInput(f"{name}: must be different points, got equal ones")
+            raise InvalidInput(f"{name}: must be different points, got equal points")
         if abs(line[2]) < 1e-6 * scale:
             raise InvalidInput(
-                f"{name}: must give a horizon outside the middle of the image; crop the image to the plane"
+                f"{name}: must give a horizon that does not pass through the middle of the image; crop the image to the plane"
             )
         rise = line[:2] / line[2]
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)

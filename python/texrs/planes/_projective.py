@@ -39,7 +39,8 @@ def as_places(points: object) -> NDArray[np.float64]:
     given = try_array(points)
     if given.dtype.kind not in "buif" or given.shape[-1:] != (2,):
         raise InvalidInput(
-            f"points: must be numbers (..., 2), rows and columns, got {given.dtype} of shape {given.shape}"
+            f"points: must be numbers of shape (..., 2), with the row and column of each point, got "
+            f"{given.dtype} of shape {given.shape}"
         )
     return np.asarray(given, np.float64)
 

@@ -76,7 +76,7 @@ class PlaneView:
         if self.tilt is not None and self.slant is None:
             raise InvalidInput("tilt: requires slant; give both")
         if self.plane is not None and self.fov is not None:
-            raise InvalidInput("fov: cannot be combined with plane, which has its own")
+            raise InvalidInput("fov: cannot be combined with plane, which has its own field of view")
         for name, least, most in (("slant", 0, MAX_SLANT), ("tilt", -1e6, 1e6), ("fov", 1, 170)):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else as_float(value, name, least, most))
@@ -111,7 +111,7 @@ class PlaneView:
         if given is None or isinstance(given, Plane):
             return cls(plane=given)
         if isinstance(given, list | tuple):
-            raise InvalidInput(f"view: must be one plane at a time, got {len(given)}")
+            raise InvalidInput(f"view: must be one plane, got a sequence of {len(given)}")
         if not isinstance(given, PlaneView):
             raise InvalidInput(f"view: must be a texrs.PlaneView or a texrs.Plane, got {given!r}")
         return given

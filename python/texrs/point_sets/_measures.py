@@ -61,7 +61,7 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
 
     """
     if len(points) < 3:
-        raise InvalidInput(f"points: must be at least three for a layout, got {len(points)}")
+        raise InvalidInput(f"points: must contain at least three points for a layout, got {len(points)}")
     far = nearest_distances(points, min(count, len(points) - 1))
     return float(np.median(far.mean(axis=1)[mark_inner(points, far)]))
 

@@ -211,7 +211,7 @@ def tile(
             image = image if isinstance(image, Material) else even
         if already:
             along = " and ".join(AXES[a] for a in already)
-            assume(f"{name_image(given)}: tiles already along the {along}, which are not changed")
+            assume(f"{name_image(given)}: is already tileable along the {along}, which are not changed")
         join = partial(
             _join_edges,
             image,
@@ -354,7 +354,8 @@ def _as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tup
             raise InvalidInput(f"size: must have at least 2 {AXES[axis]} to wrap them, got {side}")
         if side > shape[axis] and min(shape) < SMALLEST:
             raise InvalidInput(
-                f"size: must be at most that of the image, {shape}, if a side has fewer than {SMALLEST} pixels, got {side}"
+                f"size: must be at most the size of the image, {shape}, if the image has a side below {SMALLEST} "
+                f"pixels, got {side}"
             )
     return rows, columns
 
@@ -376,7 +377,7 @@ def _as_choices(
         try:
             chosen = as_int(each, "overlap", 1, side // 2) if wrap[axis] else 0
         except InvalidInput as error:
-            raise InvalidInput(f"{error}: at most half of the {side} {AXES[axis]}") from None
+            raise InvalidInput(f"{error} (at most half of the {side} {AXES[axis]})") from None
         found.append(Choice(chosen, chosen))
     return found
 

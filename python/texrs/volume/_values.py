@@ -96,5 +96,7 @@ def as_direction(value: object, name: str) -> NDArray[np.float64]:
     """Return a vector (plane, row, column) of finite numbers. A normal must not be zero."""
     out = try_array(value, np.float64)
     if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
-        raise InvalidInput(f"{name}: must be three numbers (plane, row, column), got {str(value)[:60]}")
+        raise InvalidInput(
+            f"{name}: must be three finite numbers (plane, row, column), and a normal must not be 0; got {str(value)[:60]}"
+        )
     return out

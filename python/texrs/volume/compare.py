@@ -220,7 +220,7 @@ def compare(
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(
             f"output: must be {first.dtype} with {first.shape[-1]} channels, like the exemplar, got {second.dtype} "
-            f"with {second.shape[-1]}"
+            f"with {second.shape[-1]} channels"
         )
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
         raise InvalidInput(f"source: must be the source map of the output, of shape {second.shape[:count]}")

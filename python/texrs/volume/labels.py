@@ -50,7 +50,9 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     """
     array = try_array(labels)
     if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"labels: must be integers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
+        raise InvalidInput(
+            f"labels: must be integers of shape (H, W) or (D, H, W), got {array.dtype} of shape {array.shape}"
+        )
     least, largest = int(array.min()), int(array.max())
     if least < 0:
         raise InvalidInput(f"labels: must be at least 0, got {least}")
@@ -63,7 +65,7 @@ def label_to_color(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArr
     given = try_array(colours)
     if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
         raise InvalidInput(
-            f"colours: must be numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}"
+            f"colours: must be integers from 0 to 255 of shape (K, 3), got {given.dtype} of shape {given.shape}"
         )
     if largest >= len(given):
         raise InvalidInput(f"labels: must be less than {len(given)}, the number of colours, got {largest}")
@@ -111,7 +113,9 @@ def extract_surface(
 
     array = try_array(mask)
     if array.dtype.kind not in "bui" or array.ndim != 3 or min(array.shape) < 2:
-        raise InvalidInput(f"mask: must be bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
+        raise InvalidInput(
+            f"mask: must be bool of shape (D, H, W) with sides of at least 2, got {array.dtype} of shape {array.shape}"
+        )
     if array.size > 2**28:
         raise LimitExceeded(f"mask: {array.size} voxels are more than the limit of {2**28}")
     steps = [as_float(s, "spacing", 1e-12, 1e12) for s in as_direction(spacing, "spacing").tolist()]
@@ -119,7 +123,7 @@ def extract_surface(
     if as_bool(closed, "closed"):
         solid = np.pad(solid, 1)
     if solid.all() or not solid.any():
-        raise InvalidInput("mask: must not be constant, because it would have no surface")
+        raise InvalidInput("mask: must not be constant, because a constant mask has no surface")
     corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
     vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
     return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)

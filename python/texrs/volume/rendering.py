@@ -139,7 +139,7 @@ def oblique_slice(
         low, high = _clip_ray(steps, middle, shape)
         start, sides = np.ceil(low), tuple((np.floor(high) - np.ceil(low) + 1).astype(int).tolist())
         if min(sides) < 1:
-            raise InvalidInput("point, normal: must give a cut through the volume")
+            raise InvalidInput("point, normal: must specify a slice that crosses the volume")
     else:
         sides = as_size(size, "size")
         start = -(np.array(sides) - 1) / 2
@@ -378,11 +378,11 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
     """Return the steps of image rows and columns in voxels, (2, 3), perpendicular to a normal or as given."""
     if (normal is None) == (axes is None):
-        raise InvalidInput("normal, axes: must not both be given or both be omitted; give one of them")
+        raise InvalidInput("normal, axes: exactly one of the two must be given")
     if axes is not None:
         steps = try_array(axes, np.float64)
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
-            raise InvalidInput("axes: must be two directions of three numbers that are not parallel")
+            raise InvalidInput("axes: must be two directions that are not parallel, each of three numbers")
         return steps
     # A normal along an axis gives the same image as an ordinary slice.
     across = as_direction(normal, "normal")

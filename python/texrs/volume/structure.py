@@ -337,13 +337,15 @@ def orientation_errors(
     v, edge = as_values(values), as_int(margin, "margin", 0, 2**20)
     each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
-        raise InvalidInput(f"margin: must be less than half of each side of {v.shape}, got {edge}")
+        raise InvalidInput(f"margin: must be less than half of each side of the array, {v.shape}, got {edge}")
     turned, spacing = check_field(field, v.ndim), find_distances(spacing, values, v.ndim)
     turned = None if turned is None else space(turned, spacing)
     n = texture_normal(v, spacing=spacing) if normal is None else try_array(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         received = n.tolist() if n.size <= v.ndim else f"shape {n.shape}"
-        raise InvalidInput(f"normal: must be {v.ndim} numbers, the largest of magnitude 1e-12 to 1e12; got {received}")
+        raise InvalidInput(
+            f"normal: must be {v.ndim} numbers whose largest magnitude is from 1e-12 to 1e12; got {received}"
+        )
     inner = (slice(edge, -edge or None, each),) * v.ndim
     tensor = _measure_structure(v, 4.0, spacing)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)

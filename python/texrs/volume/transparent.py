@@ -162,7 +162,9 @@ def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
         rows.append((*numbers, float(given), *rgb))
     found = np.array(rows)
     if (np.diff(found[:, 0]) < 0).any():
-        raise InvalidInput(f"transfer: must have rising values, got {', '.join(f'{v:g}' for v in found[:, 0])}")
+        raise InvalidInput(
+            f"transfer: the values of the stops must not decrease, got {', '.join(f'{v:g}' for v in found[:, 0])}"
+        )
     return found
 
 
@@ -175,7 +177,8 @@ def _as_colour(colour: object) -> tuple[float, float, float]:
         red, green, blue = (as_float(c, "transfer", 0, 255) / 255 for c in colour)
         return red, green, blue
     raise InvalidInput(
-        f"transfer: a colour must be like #cc3322, three numbers, or own for the colour of the voxel; got {colour!r}"
+        f"transfer: a colour must be #rrggbb, three numbers, or own (in Python None) for the colour of the voxel; "
+        f"got {colour!r}"
     )
 
 
