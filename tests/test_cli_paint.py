@@ -99,7 +99,7 @@ def test_colours_of_corners(here: Path) -> None:
         (["-o", "a.png"], "must be a .glb, .gltf or .obj file"),
         (["-o", "a.ply"], ".ply is only for colours of vertices"),
         (["-o", "a.glb", "--along", "y"], "--along: must be combined with --directions"),
-        (["-o", "a.glb", "--directions", "up"], "--directions: must be an axis (x, y, z"),
+        (["-o", "a.glb", "--directions", "up"], "--directions: must be an axis such as x"),
         (["-o", "a.glb", "--directions", "x", "--field", "circular"], "cannot be combined with"),
         (["-o", "a.glb", "--bits", "12"], "--bits: must be one of 8, 16"),
         (["-o", "a.glb", "--role", "a=height"], "--role: only available for materials"),

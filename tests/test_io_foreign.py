@@ -275,7 +275,7 @@ def test_a_plane_of_vectors_in_space(tmp_path: Path) -> None:
         (np.zeros((4, 4, 4, 3)), 3, "directions: must not all have length 0"),
         (7, 3, "field: must be a field with 3 axes, got int"),
         ("nowhere.npy", 3, "does not exist"),
-        ("flow.npy:around=z", 3, "options of a file must be among along=, order=, up=, signed="),
+        ("flow.npy:around=z", 3, "options of a file must be one of along=, order=, up=, signed="),
         ("flow.npy:up=1x", 3, "up= must be three numbers"),
         ("flow.npy:signed=1", 3, "signed= must be yes or no"),
         ("flow.npy:along=w", 3, "along: must be one of z, y, x"),

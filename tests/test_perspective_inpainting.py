@@ -190,7 +190,7 @@ def test_an_output_that_wraps(floor):
         ({"scale_map": "guess"}, "scale_map: must be 'auto'"),
         ({"scale_map": np.ones((3, 3))}, "scale_map: must have shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
-        ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: requires exemplar"),
+        ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: needs exemplar"),
         (
             {
                 "scale_map": np.ones((64, 64)),

@@ -124,7 +124,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
         ("--mask mask.png --window 3", "--window: must be an integer between 16 and 128, got 3"),
         ("--mask mask.png --measure area2", "--measure: must be one of boundary, skeleton, count, area"),
         ("--mask mask.png --trend up", "--trend: must be one of none, plane, linear, quadratic; got 'up'"),
-        ("--mask hole.png", "hole.png: has too few features"),
+        ("--mask hole.png", "hole.png: must mark more features"),
         ("--slant 3 --edit bad.json", "--edit: step 1 must have an 'op', one of magnify"),
         ("--slant 3 --edit none.json", "none.json: "),
         ("--slant 3 --edit mask.png", "--edit: step 1 must have an 'op', one of magnify"),
@@ -132,7 +132,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
         ("--slant 3 --mode user", "--mode: must be one of stretch, extend; got 'user'"),
         ("--slant 3 --encoding log", "--encoding: must be one of log2, paper; got 'log'"),
         ("--slant 3 --size 5x0", "--size: each side must be at least 1"),
-        ("--scale-map in.png", "in.png: must be grey levels, got colours"),
+        ("--scale-map in.png", "in.png: must contain grey levels, got colours"),
         ("--scale-map none.npy", "none.npy:"),
     ],
 )  # fmt: skip

@@ -490,7 +490,9 @@ class TextureDatabase:
         found = self._folder.read()
         if not isinstance(name, str) or name not in found:
             if not found:
-                raise InvalidInput(f"name: texture {name!r} is not in {self.path}, because the database is empty")
+                raise InvalidInput(
+                    f"name: texture {name!r} is not in {self.path}, because this database has no textures"
+                )
             there = ", ".join(sorted(found)[:8]) + (", ..." if len(found) > 8 else "")
             raise InvalidInput(f"name: texture {name!r} is not in {self.path}; must be one of {there}")
         return found[name]

@@ -135,7 +135,9 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
     slopes = _slopes(_as_map(volume), sigma)
     if as_bool(across, "across"):
         if slopes.shape[-1] != 2:
-            raise InvalidInput("across: must be False for a volume, which has no single direction along its contours")
+            raise InvalidInput(
+                "across: must be False for a volume, because the direction along its contours is ambiguous"
+            )
         slopes = np.stack([-slopes[..., 1], slopes[..., 0]], axis=-1)
     return from_directions(slopes, along=along)
 
@@ -175,7 +177,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
     sigma = as_float(sigma, "sigma", 0, 100)
     slopes = _slopes(_as_map(volume), sigma / 2)
     if not np.abs(slopes).max():
-        raise InvalidInput("volume: must not be constant, because a constant array has no grain to follow")
+        raise InvalidInput("volume: must not be constant, because the grain of a constant array is undefined")
     axes = slopes.shape[-1]
     tensor = np.empty((*slopes.shape, axes))
     for i in range(axes):

@@ -198,7 +198,7 @@ def _parse_options(words: str) -> dict[str, Any]:
         key, _, value = (p.strip() for p in part.partition("="))
         if key not in _OPTIONS:
             raise InvalidInput(
-                f"field: options of a file must be among {', '.join(f'{o}=' for o in _OPTIONS)}; got {part!r}"
+                f"field: options of a file must be one of {', '.join(f'{o}=' for o in _OPTIONS)}; got {part!r}"
             )
         if key == "up":
             try:

@@ -325,7 +325,7 @@ def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float6
         logs[..., index] = _to_matrices((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     if mirrored not in (0, count):
         raise InvalidInput(
-            f"frames: must either all be mirrored or all not, got {mirrored} mirrored of {count}; a frame interpolated "
+            f"frames: all or none must be mirrored, got {mirrored} mirrored of {count}; a frame interpolated "
             "between them would be flat"
         )
     if uneven > 1e-5:

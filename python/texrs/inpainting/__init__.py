@@ -218,7 +218,7 @@ def inpaint(
             progress=progress,
         )
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
-        raise InvalidInput("exemplar_scale_map: requires exemplar, and scale_map in the same units")
+        raise InvalidInput("exemplar_scale_map: needs exemplar, and scale_map in the same units")
     if scale_kind is not None and scale_map is None:
         raise InvalidInput("scale_kind: has no effect without scale_map; give scale_map or omit scale_kind")
     said = None if scale_kind is None else as_kind(scale_kind)

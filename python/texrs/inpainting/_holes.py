@@ -41,7 +41,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
     marks, shape = mask.marks, pixels.shape[:axes]
     alpha, worded = _is_alpha(marks), is_value(marks)
     if worded and mask.threshold is not None:
-        raise InvalidInput("threshold: requires a mask that is an image, or 'alpha'")
+        raise InvalidInput("threshold: needs a mask that is an image, or 'alpha'")
     if alpha:
         hole = adjust(mask, _mark_transparent(pixels, axes, mask.threshold), wrap)
     elif worded:

@@ -314,4 +314,4 @@ class Exports(Mapping[str, Map]):
 
     def _check_flat(self) -> None:
         if self.axes != 2:
-            raise InvalidInput("material: must not be a volume; write slices of it instead")
+            raise InvalidInput("material: must not be a volume; write slices of the volume")

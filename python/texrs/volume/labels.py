@@ -123,7 +123,7 @@ def extract_surface(
     if as_bool(closed, "closed"):
         solid = np.pad(solid, 1)
     if solid.all() or not solid.any():
-        raise InvalidInput("mask: must not be constant, because a constant mask has no surface")
+        raise InvalidInput("mask: must not be constant, because the surface of a constant mask is empty")
     corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
     vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
     return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)
