@@ -120,9 +120,10 @@ def rewrite(text: str, folder: Path, drawings: Path) -> str:
         near = source.group(1).rpartition("/")[0]
         width, height, copies = make_copies(file)
         # Drawings and pictures have a version for phones, which the browser chooses by the width of the window.
-        narrow = file.with_name(f"{file.stem}-narrow.png")
-        if file.suffix == ".png" and (drawings / narrow.name).exists():
-            shutil.copyfile(drawings / narrow.name, narrow)
+        narrow = file.with_name(f"{file.stem}-{file.suffix[1:]}-narrow.png")
+        drawing = drawings / f"{file.stem}-narrow.png"
+        if file.suffix == ".png" and drawing.exists():
+            shutil.copyfile(drawing, narrow)
             is_narrow = True
         else:
             is_narrow = wrap_panels(file, narrow)
@@ -157,7 +158,8 @@ def make_copies(file: Path) -> tuple[int, int, list[tuple[str, int]]]:
         width, height = picture.size
         copies = []
         for wide in sorted({min(wide, width) for wide in WIDTHS}):
-            copy = file.with_name(f"{file.stem}-{wide}.webp")
+            # The suffix is part of the name, because pictures and drawings of one name differ only in it.
+            copy = file.with_name(f"{file.stem}-{file.suffix[1:]}-{wide}.webp")
             if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
                 shown = picture.convert(
                     "RGBA" if "A" in picture.getbands() or "transparency" in picture.info else "RGB"

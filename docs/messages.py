@@ -49,17 +49,17 @@ KINDS = (
     ),
     kind(
         r"is (?:only )?for|not for use|needs? (?:method|quality|a volume|a picture|an image)"
-        r"|only (?:with|for|where)|without|for use with|does not (?:take|apply)",
+        r"|only (?:available|with|for|where)|without|for use with|does not (?:take|apply)",
         "The argument cannot be used in this call.",
         "Leave out the argument, or change the other argument in the message.",
     ),
     kind(
-        r"no such|not found|cannot be (?:read|opened|written)|does not exist|is not there|missing|lacks?\b|has no ",
+        r"no such|not found|cannot be (?:read|opened|written)|does not exist|is not there",
         "A required file, value or package is missing.",
         "Check the name and the path.",
     ),
     kind(
-        r"damaged|truncated|broken|not a (?:valid )?\w+ file|corrupt|ends (?:early|before)",
+        r"damaged|truncated|broken|cut off or|not a (?:valid )?\w+ file|corrupt|ends (?:early|before)",
         "The file is damaged, or its format is not the expected format.",
         "Open the file in another program and save it again.",
     ),
@@ -73,6 +73,7 @@ KINDS = (
         "The value is not one of the allowed words.",
         "Use one of the words in the message.",
     ),
+    kind(r"missing|lacks?\b|has no ", "A part of the input is missing.", "Add the part that the message names."),
     kind(
         r"at least|at most|between|from .* to|out of|beyond|outside|within|too (?:small|large|many|few)"
         r"|larger|smaller|more than|fewer|less than|greater|positive|sides? ",
