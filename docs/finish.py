@@ -29,6 +29,8 @@ NARROW = "(max-width: 720px)"
 """Windows that show the narrow version of a drawing or picture, with few panels in a row."""
 PHONE = 520
 """Width of the narrow version of a picture, in pixels: two usual panels in a row."""
+MANY = 4
+"""Number of columns from which on the rows of a table are lists on phones."""
 LONG = 13
 """Length of code that can be broken in a table, in characters."""
 GAP = 8
@@ -48,7 +50,7 @@ def finish(app: object, error: Exception | None) -> None:
                         "<body>", '<body class="beside">', 1
                     )
                 drawings = Path(app.srcdir) / "generated" / "drawings"  # type: ignore[attr-defined]
-                made = break_code(name_parts(rewrite(drop_scripts(text, page.name), page.parent, drawings)))
+                made = name_cells(break_code(name_parts(rewrite(drop_scripts(text, page.name), page.parent, drawings))))
                 icons.update(re.findall(r"\bfa-[a-z0-9-]+", made))
                 page.write_text(made, encoding="utf-8")
         for script in (root / "_static" / "scripts").glob("pydata-sphinx-theme.js"):
@@ -88,6 +90,37 @@ def break_code(text: str) -> str:
 
     text = re.sub(r'<span class="pre">(?=(?:&#?\w+;|[\'(\[])*-)', '<span class="pre option">', text)
     return re.sub(r"<td\b.*?</td>", mark_words, text, flags=re.DOTALL)
+
+
+def name_cells(text: str) -> str:
+    """Label the cells of tables with many columns, whose rows are lists on phones; and mark lines and options of commands."""
+
+    def label(table: re.Match[str]) -> str:
+        head, body = table.group(1), table.group(2)
+        names = [re.sub("<.*?>", "", each).strip() for each in re.findall(r"<th\b.*?</th>", head, re.DOTALL)]
+        if len(names) < MANY:
+            return table.group(0)
+
+        def label_row(row: re.Match[str]) -> str:
+            cells = re.findall(r"<td\b[^>]*>(.*?)</td>", row.group(0), re.DOTALL)
+            shown = ""
+            for name, cell in zip(names, cells, strict=True):
+                empty = "" if re.sub("<.*?>", "", cell).strip() else ' class="empty"'
+                shown += f'<td data-label="{name}"{empty}>{cell}</td>\n'
+            return f"{row.group(1)}{shown}</tr>"
+
+        body = re.sub(r"(<tr\b[^>]*>)(?:\s*<td\b.*?</td>)+\s*</tr>", label_row, body, flags=re.DOTALL)
+        return f'<table class="table stacked">{head}<tbody>{body}</table>'
+
+    def mark(block: re.Match[str]) -> str:
+        lines = block.group(2).rstrip("\n").split("\n")
+        marked = (re.sub(r"(?<=[\s>])--?[A-Za-z][\w-]*", r'<span class="option">\g<0></span>', line) for line in lines)
+        return block.group(1) + "".join(f'<span class="line">{line}\n</span>' for line in marked) + "</pre>"
+
+    text = re.sub(r'<table class="table">(.*?)<tbody>(.*?)</table>', label, text, flags=re.DOTALL)
+    return re.sub(
+        r'(<div class="highlight-sh notranslate"><div class="highlight"><pre>)(.*?)</pre>', mark, text, flags=re.DOTALL
+    )
 
 
 def drop_icons(sheet: str, used: set[str]) -> str:
