@@ -11,7 +11,6 @@ import pytest
 import texrs
 from texrs.errors import InvalidInput
 from texrs.transforms import TextureAugment, follow_boxes
-from texrs.transforms._augment import find_things
 
 SIDE = 96
 SAMPLE = texrs.samples.load("dots", size=(SIDE, SIDE))
@@ -120,24 +119,12 @@ def test_without_a_seed_each_sample_differs_in_this_process_and_in_forked_worker
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
-def test_things_of_large_pictures_are_found_on_half_of_the_samples(dtype: str):
+def test_every_pixel_is_a_copy_for_all_types(dtype: str):
     sample = texrs.samples.dots((160, 150))
     image = sample.image.astype(dtype) * np.dtype(dtype).type(257 if dtype == "uint16" else 1)
-    found = find_things(texrs.Exemplar(image)).labels
-    assert found is not None
-    assert found.shape == (160, 150)
-    # Nearly all elements of all samples are found, each with its own number.
-    whole = texrs.Exemplar(image).segment().elements
-    assert ((found > 0) == (whole > 0)).mean() > 0.93
-    assert found.max() == pytest.approx(whole.max(), rel=0.2)
     made = texrs.transforms.TextureAugment()(image, sample.labels, seed=2)
     assert made.image.dtype == image.dtype
     assert (made.image == image[tuple(np.moveaxis(made.source_map.coordinates.astype(int), -1, 0))]).all()
-
-
-def test_what_keeps_to_lines_is_found_on_all_samples():
-    assert find_things(texrs.Exemplar(texrs.samples.bricks((160, 160)).image)).labels is None
-    assert find_things(texrs.Exemplar(texrs.samples.dots((96, 96)).image)).labels is None
 
 
 @pytest.mark.parametrize("start", ["fork", "spawn"])

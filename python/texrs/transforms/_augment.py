@@ -9,21 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_ndarray, as_seed
-from texrs._colours import shrink
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
+from texrs.exemplar import Exemplar, as_exemplar
 from texrs.papers.design import design
 from texrs.source_map import SourceMap
 from texrs.transforms._boxes import follow_boxes
 
 SHORTEST = 16
 """Minimum side of an image, in pixels."""
-LARGE = 128
-"""Minimum side, in pixels, of images whose elements are found at half the resolution.
-
-Outlines are then accurate to a pixel, in a third of the time.
-"""
 
 
 class Augmented(NamedTuple):
@@ -68,22 +62,6 @@ class Augmented(NamedTuple):
     """Seed of this result. The same seed gives the same result."""
 
 
-def find_things(image: Exemplar) -> ElementOptions:
-    """Return options for finding elements. For a large image, they contain labels found at half the resolution."""
-    pixels = image.pixels
-    if image.labels or min(image.shape) < LARGE or pixels.dtype.kind not in "uf":
-        return ElementOptions()
-    half = tuple(n // 2 for n in image.shape)
-    means = shrink(pixels.astype(np.float32), half)
-    small = Exemplar(np.rint(means).astype(pixels.dtype) if pixels.dtype.kind == "u" else means)
-    found = small.segment()
-    if found.kind != "components" or found.lattice is not None or found.courses is not None:
-        # Elements in a lattice or in courses must stay exactly in line, so find them at full resolution.
-        return ElementOptions()
-    rows, columns = (np.arange(n) * m // n for n, m in zip(image.shape, half, strict=True))
-    return ElementOptions(labels=found.elements[np.ix_(rows, columns)])
-
-
 class TextureAugment:
     """Rearrange an image from pieces of itself, joined along minimum cuts, and move its labels and boxes with it.
 
@@ -95,8 +73,7 @@ class TextureAugment:
     The same image and seed give the same result in any process and with any number of threads. The kernels release the
     interpreter lock, so threads work as well as processes, forked or spawned. If a loader has one worker per core, set
     `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1``, so that workers do not compete. The analysis
-    of an image is cached for a while, so its second result takes a fraction of the time of the first. Elements of
-    images of at least 128 pixels a side are found at half the resolution, which is as good and faster.
+    of an image is cached for a while, so its second result takes a fraction of the time of the first.
 
     Parameters
     ----------
@@ -171,8 +148,7 @@ class TextureAugment:
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: must have the size of the image, {known.shape}, got {labels.shape[:2]}")
-        things = known.cached("things of an augmented picture", lambda: find_things(known))
-        source = design(known, known.shape, seed=number, wrap=False, motion="keep", elements=things).source_map
+        source = design(known, known.shape, seed=number, wrap=False, motion="keep").source_map
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.min_visible)
