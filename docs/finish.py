@@ -213,11 +213,18 @@ def wrap_panels(file: Path, narrow: Path) -> bool:
             return False
         picture = opened.convert("RGB")
     rows: list[list[Image.Image]] = []
+    top, was_input = -1, True
     for box in json.loads(comment)["panels"]:
         panel = picture.crop(tuple(box))
+        # Inputs have an orange frame. Begin a row with the inputs that follow a result.
+        red, green, blue = (int(value) for value in panel.getpixel((panel.width // 2, panel.height - 2)))
+        is_input = red > 160 and 60 < green < 140 and blue < 70
+        if rows and (box[1] != top or (is_input and not was_input)):
+            rows.append([])
+        top, was_input = box[1], is_input
         if panel.width > PHONE:
             panel = panel.resize((PHONE, round(panel.height * PHONE / panel.width)), Image.Resampling.LANCZOS)
-        if not rows or sum(each.width + GAP for each in rows[-1]) + panel.width > PHONE:
+        if not rows or (rows[-1] and sum(each.width + GAP for each in rows[-1]) + panel.width > PHONE):
             rows.append([])
         rows[-1].append(panel)
     high = sum(max(each.height for each in row) + GAP for row in rows) - GAP
