@@ -22,6 +22,8 @@ from PIL import Image
 
 WIDTHS = (480, 960)
 """Widths of the copies, in pixels: for a phone or half a text column, and for a whole text column."""
+SMALL = (256, 480)
+"""Widths of the copies of images in strips, which are shown at less than a quarter of the text column."""
 QUALITY = 74
 SIZES = "(max-width: 720px) 94vw, (max-width: 1200px) 66vw, 820px"
 THUMBNAIL = "16rem"
@@ -190,7 +192,7 @@ def make_copies(file: Path) -> tuple[int, int, list[tuple[str, int]]]:
     with Image.open(file) as picture:
         width, height = picture.size
         copies = []
-        for wide in sorted({min(wide, width) for wide in WIDTHS}):
+        for wide in sorted({min(wide, width) for wide in (SMALL if "strips" in file.parts else WIDTHS)}):
             # The suffix is part of the name, because pictures and drawings of one name differ only in it.
             copy = file.with_name(f"{file.stem}-{file.suffix[1:]}-{wide}.webp")
             if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
