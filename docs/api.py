@@ -246,7 +246,7 @@ def list_rows(function: Callable[..., Any], options: dict[str, str]) -> Iterator
         shape = re.sub(r",? ?(?:optional|default .*)$", "", kind)
         plain = re.match("int|float|pair|\\(", kind) and "array" not in kind
         given = f"one of {choices[1]}" if choices else found[0] if found and plain else shape
-        default = show_default(known[name].default)
+        default = "" if known[name].kind is inspect.Parameter.VAR_KEYWORD else show_default(known[name].default)
         yield f"`{name}`", options.get(name, ""), sentences[0], unit, given, default or usual or "none"
 
 
