@@ -62,7 +62,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert made == {f"made/{n}.png" for n in names} | {f"maps/{n}.npz" for n in names} | {"made/sheet.png"}
     err = capsys.readouterr().err.splitlines()
     assert err[0] == "texrs: 1 of 8: wrote made/dots-still-3.png"
-    assert err[-1].startswith("texrs: 8 of 8 results are there, 0 failed, in ")
+    assert err[-1].startswith("texrs: 8 of 8 results are complete, 0 failed, in ")
     assert io.read("made/sheet.png").shape == (768, 768, 3)
     assert said("made/sheet.png")["verb"] == "batch"
     one = said("made/dots-turned-4.png")
@@ -97,7 +97,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert main(["batch", "../all.toml"]) == 0
     os.chdir("..")
     err = capsys.readouterr().err.splitlines()
-    assert sum("is there" in line for line in err) == 8
+    assert sum("exists already" in line for line in err) == 8
     assert files(here) == whole
     assert {n for n in whole if os.stat(n).st_mtime_ns != times[n]} == {"made/sheet.png"}
     # Results that are missing, changed or made in another way are computed again.
@@ -133,7 +133,7 @@ def test_one_that_fails_stops_no_other(here: Path, capsys: Capture) -> None:
     assert [line.split()[2] for line in failed] == ["stones/broken.png", "stones/small.png", "stones/weave.png"]
     assert "cut off" in failed[0]
     assert "--force" in failed[2]
-    assert err[-1].startswith("texrs: 1 of 4 results are there, 3 failed")
+    assert err[-1].startswith("texrs: 1 of 4 results are complete, 3 failed")
     assert Path("out/weave.png").read_bytes() == b"dear"
     assert io.read("sheet.png").shape == (512, 512, 3)
     assert main([*command, "-q"]) == 3
@@ -163,22 +163,25 @@ def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("recipe", "words"),
     [
-        ("", "must contain verb"),
-        ('verb = "design"', "must contain inputs"),
-        ('verb = "design"\ninputs = "stones"', "must contain out"),
+        ("", "verb is missing"),
+        ('verb = "design"', "inputs is missing"),
+        ('verb = "design"\ninputs = "stones"', "out is missing"),
         ('verb = "design"\ninputs = "stones"\nout = "o"\nseed = 3', "unknown key 'seed'; must be one of verb, inputs"),
         ('verb = "desing"\ninputs = "stones"\nout = "o"', "got 'desing'"),
         ('verb = "batch"\ninputs = "stones"\nout = "o"', "got 'batch'"),
         ('verb = "design"\ninputs = "no/*.png"\nout = "o"', "none match 'no/*.png'"),
-        ('verb = "design"\ninputs = [1]\nout = "o"', "inputs: must be a text or a list of texts, got [1]"),
+        ('verb = "design"\ninputs = [1]\nout = "o"', "inputs: must be a string or a list of strings, got [1]"),
         ('verb = "design"\ninputs = "stones"\nout = "o"\nseeds = "5:5"', "seeds: must be A:B as in 0:32"),
         ('verb = "design"\ninputs = "stones"\nout = "o"\nseeds = [1.5]', "seeds: must be A:B as in 0:32"),
         ('verb = "design"\ninputs = "stones"\nout = "o.png"', "several have the name o.png"),
         ('verb = "design"\ninputs = "stones"\nout = "{name}.png"\nseeds = "0:2"', "several have the name"),
         ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = {sise = 3}', "No such option: --sise"),
-        ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = {size = {a = 3}}', "size must be a text, a number"),
+        (
+            'verb = "design"\ninputs = "stones"\nout = "o"\noptions = {size = {a = 3}}',
+            "size must be a string, a number",
+        ),
         ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = 3', "options must be a table"),
-        ('verb = "design"\ninputs = "stones"\nout = "o"\npresets = {a = 3}', "presets must be tables"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\npresets = {a = 3}', "each preset must be a table"),
         ('verb = "tile"\ninputs = "stones"\nout = "o"\nsheet = "stones/dots.png"', "is an input"),
         ("verb = ", "is not TOML"),
     ],
@@ -211,7 +214,7 @@ def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: i
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     if number == signal.SIGINT:
         assert any("the same command continues from there" in line for line in rest)
-        assert "what was done is kept: made/dots-still-3.png, made/dots-still-4.png" in rest[-1]
+        assert "files that were finished before are kept: made/dots-still-3.png, made/dots-still-4.png" in rest[-1]
     done = {n: (here / n).stat().st_mtime_ns for n in files(here) if n.startswith("made/dots-still")}
     assert len(done) >= 2
     assert main(command) == 0
@@ -235,10 +238,10 @@ def test_workers_make_the_same_bytes_each_once(here: Path, capsys: Capture, how:
         err = capsys.readouterr().err.splitlines()
         assert files(here) == alone
         assert {n: os.stat(n).st_mtime_ns for n in kept} == kept
-        assert sum("is there" in line for line in err) == 3
+        assert sum("exists already" in line for line in err) == 3
         assert sum(": wrote made/dots" in line or ": wrote made/weave" in line for line in err) == 5
         assert err[-5].startswith("texrs: failed: stones/broken.png to made/broken-still-3.png: ")
-        assert err[-1].startswith("texrs: 8 of 12 results are there, 4 failed")
+        assert err[-1].startswith("texrs: 8 of 12 results are complete, 4 failed")
         assert main(["batch", "all.toml", *words, "-q"]) == 3
     assert files(here) == alone
 
@@ -328,7 +331,7 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
             f"made/{n}-{s}/{n}_{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")
         ]
     # In the second run, all results exist already.
-    assert capsys.readouterr().err.count("is there") == 4
+    assert capsys.readouterr().err.count("exists already") == 4
     assert main([*words, "stacks", "--sheet", "sheet.png", "-q"]) == 0
     assert io.read("made/rock-0/rock_height.png").dtype == np.uint16
     assert io.read("sheet.png").std() > 5
@@ -337,7 +340,7 @@ def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> Non
     Path("made/rock-1/rock_height.png").unlink()
     capsys.readouterr()
     assert main([*words, "stacks"]) == 0
-    assert capsys.readouterr().err.count("is there") == 3
+    assert capsys.readouterr().err.count("exists already") == 3
     assert files(here) == whole
     assert main(["rerun", "made/moss-1", "-q"]) == 0
     assert capsys.readouterr().out.count("the same bytes") == 2

@@ -46,10 +46,10 @@ def test_a_tree_comes_out_as_it_went_in(here: Path, capsys: Capture) -> None:
     assert [name.replace("c/rock_", "c/") for name in made("out")] == expected
     assert Path("out/One.JPG").read_bytes()[:3] == b"\xff\xd8\xff"
     assert io.read("out/a/b/deep.tif").dtype == np.uint16
-    assert capsys.readouterr().err.splitlines()[-1].startswith("texrs: 5 of 5 results are there, 0 failed, in ")
+    assert capsys.readouterr().err.splitlines()[-1].startswith("texrs: 5 of 5 results are complete, 0 failed, in ")
     before = files(here)
     assert main(command) == 0
-    assert capsys.readouterr().err.count("is there") == 5
+    assert capsys.readouterr().err.count("exists already") == 5
     assert files(here) == before
     # Results inside the tree are not inputs.
     assert main(["batch", "tile", ".", "-o", "out", "-q"]) == 0
@@ -86,7 +86,7 @@ def test_maps_of_one_material_in_a_folder_of_several_are_one_job(here: Path, cap
     for number, inputs in enumerate((["in"], ["in/*"], sorted(map(str, Path("in").iterdir())))):
         assert main(["batch", "tile", *inputs, "-o", f"out{number}"]) == 0
         err = capsys.readouterr().err
-        assert "5 of 5 results are there, 0 failed, 1 ignored parts of their inputs" in err
+        assert "5 of 5 results are complete, 0 failed, 1 ignored parts of their inputs" in err
         assert err.count("T_Rock_preview.png") == 1
         assert "bark_normal.png (assumed: in/bark_normal.png: read as colours" in err
         folders = {Path(name).parts[0] for name in made(f"out{number}")}
@@ -139,7 +139,7 @@ def test_files_that_are_not_read_are_counted(here: Path, capsys: Capture) -> Non
         Path("in", name).write_bytes(b"x")
     assert main(["batch", "tile", "in", "-o", "out"]) == 0
     err = capsys.readouterr().err
-    assert "in: 11 files not used, because the suffix is not that of a format: in/list.sbs, " in err
+    assert "in: 11 files not used, because texrs does not read this suffix: in/list.sbs, " in err
     assert " and 3 more" in err
     assert main(["batch", "tile", "in", "-o", "strict", "--strict"]) == 2
     assert not Path("strict").exists()
@@ -151,7 +151,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
     put("masks/one_mask.png", HOLE)
     command = ["batch", "inpaint", "photos", "-o", "out", "--argument", "masks/{folder}/{name}_mask.png"]
     assert main(command) == 2
-    assert "1 of 2 inputs lack a file: photos/a/two.png needs masks/a/two_mask.png" in capsys.readouterr().err
+    assert "files are missing for 1 of 2 inputs: photos/a/two.png needs masks/a/two_mask.png" in capsys.readouterr().err
     assert not Path("out").exists()
     put("masks/a/two_mask.png", HOLE)
     assert main([*command, "-q"]) == 0
@@ -169,7 +169,7 @@ def test_masks_by_name_and_one_for_all(here: Path, capsys: Capture) -> None:
         assert main(["batch", "inpaint", "photos", "-o", f"one{number}", *words, "-q"]) == 0
         assert made(f"one{number}") == ["a/two.png", "one.jpg"]
     assert main(["batch", "remove", "photos", "-o", "none"]) == 2
-    assert "--argument: must give MASK of texrs remove for each input" in capsys.readouterr().err
+    assert "--argument: must specify the argument MASK of texrs remove for each input" in capsys.readouterr().err
 
 
 def test_masks_next_to_the_images_are_not_inputs(here: Path) -> None:

@@ -268,7 +268,7 @@ def test_apply_is_all_or_nothing(here: Path, capsys: Capture) -> None:
         ("in.png small.png", "results", "small.png: exemplar 0 must have size"),
         ("in.png small.png", "one.png", "must be an existing folder"),
         ("in.png", ".", "--out: ./in.png is an input (in.png), and would be lost"),
-        ("in.png other/in.png", "results", "two maps have the name in.png"),
+        ("in.png other/in.png", "results", "two results would have the name in.png"),
         ("in.png", "out.exr", "uint8"),
         ("in.png no.png", "results", "no.png"),
     ):
@@ -285,7 +285,7 @@ def test_apply_takes_as_many_maps_as_there_were_examples(here: Path, capsys: Cap
     assert main(["apply", "two.npz", "in.png", "other.png", "-o", "out.png", "-q"]) == 0
     assert (iio.imread("out.png") == np.where(which[..., None] == 0, COLOURS, 255 - COLOURS)).all()
     assert main(["apply", "two.npz", "in.png", "-o", "out.png"]) == 2
-    assert "must be 2 images for each result" in complaint(capsys)
+    assert "each result needs 2 images" in complaint(capsys)
 
 
 def test_apply_to_a_volume(here: Path) -> None:

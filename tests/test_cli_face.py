@@ -72,7 +72,7 @@ def test_ctrl_c_while_it_loads_leaves_no_traceback(tmp_path: Path, library: str)
         preexec_fn=heed,
     )
     assert done.returncode == 130
-    assert done.stderr.splitlines() == ["texrs: stopped; nothing was left half-written"]
+    assert done.stderr.splitlines() == ["texrs: stopped; no incomplete files are left"]
 
 
 def test_a_hole_in_alpha_is_filled_from_a_picture_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ NAN = np.where(GREY > 128, np.nan, np.float32(1))
 INPUTS: dict[str, tuple[bytes | None, str]] = {
     "missing": (None, "does not exist"),
     "empty": (b"", "empty"),
-    "text": (b"hello, this is no picture\n" * 9, "must contain one of"),
+    "text": (b"hello, this is no picture\n" * 9, "must be a file in one of"),
     "truncated": (png(COLOURS)[:-900], "bad.png"),
     "NaN": (npy(NAN), "NaN or infinite"),
     "objects": (npy(np.array([[{}, 1], [2, 3]], object), pickle=True), "bad.png"),

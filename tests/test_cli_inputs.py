@@ -115,4 +115,4 @@ def test_a_folder_of_inputs_may_take_what_replaces_none(here: Path, capsys: Capt
     Path("gravel").mkdir()
     assert main(["samples", "gravel", "-o", "gravel", "-q"]) == 0
     assert main(["design", "in.png", *TINY, "-o", "many.png", "--variants", "2", "--stages", "."]) == 2
-    assert "--stages: must be a name" in complaint(capsys)
+    assert "--stages: must contain a file name" in complaint(capsys)

@@ -179,7 +179,7 @@ def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFix
     assert main(["rerun", "new", "-o", "other", "-q"]) == 2
     assert "--out: only available for one file" in capsys.readouterr().err
     assert main(["rerun", "rock", "-q"]) == 2
-    assert "rock: none of its files has a record of how it was made" in capsys.readouterr().err
+    assert "rock: contains no file with a record of the command that made it" in capsys.readouterr().err
     assert main(["tile", "rock", "-o", "other", "-q"]) == 0
     os.rename("other/rock_albedo.png", "new/other.png")
     assert main(["rerun", "new", "-q"]) == 2
@@ -258,10 +258,10 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock -o new.exr --depth 16", "--out: must be a folder with --depth"),
         ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: only available for materials"),
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: only available for materials"),
-        ("design rock rock/rock_albedo.png -o new", "must all be materials, or none of them"),
+        ("design rock rock/rock_albedo.png -o new", "must either all be materials or all be images"),
         ("design rock -o mine", "mine/rock_albedo.png exists"),
-        ("design same -o same", "--out: same is an input, and would contain other maps"),
-        ("tile rock -o new --mipmaps links/../rock", "rock is an input, and would contain other maps"),
+        ("design same -o same", "--out: same is the folder of an input, and would contain other maps"),
+        ("tile rock -o new --mipmaps links/../rock", "rock is the folder of an input, and would contain other maps"),
         ("tile uneven -o new", "uneven: must all have the same size, but height has"),
         ("design rock -o links", "is an input (rock/rock_albedo.png), and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is an input"),

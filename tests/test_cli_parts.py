@@ -38,12 +38,12 @@ def test_a_solid_into_zarr(files: Path, workers: int | None, capsys: pytest.Capt
     assert main(words) == 0
     said = capsys.readouterr().err
     assert "each worker needs up to" in said
-    assert "9 chunks, of which 0 were there" in said
+    assert "9 chunks, of which 0 existed already" in said
     wanted = texrs.SolidTexture(STRIPES, seed=3)[1:25, 7:27, -5:25]
     assert np.array_equal(stores.open_store(files / "out.zarr").compute(), wanted)
     assert main(words) == 0
     found = capsys.readouterr().err
-    assert "9 chunks, of which 9 were there" in found
+    assert "9 chunks, of which 9 existed already" in found
     assert main([*words[:-2], "--seed", "4"]) == 2
     assert "contains other data" in capsys.readouterr().err
     if not workers:
@@ -87,7 +87,7 @@ def test_files_by_workers_and_after_a_stop(
         file.write("2")  # The entry of chunk 2 is cut off, so the chunk is computed again.
     capsys.readouterr()
     assert main([*words, "--workers", "2"]) == 0
-    assert "3 chunks, of which 2 were there" in capsys.readouterr().err
+    assert "3 chunks, of which 2 existed already" in capsys.readouterr().err
     whole = np.fromfile(files / name, np.uint8)[-(24**3) * 3 :].reshape(24, 24, 24, 3)
     assert np.array_equal(whole, texture[0:24, 0:24, 0:24])
 
@@ -179,7 +179,7 @@ def test_a_window_of_a_picture(files: Path) -> None:
         (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: only available for results that are not written in parts"),
         (["--out", "x.zarr", "--source-map", "m.npz"], "--source-map: cannot be combined with"),
         (["--out", "x.zarr", "--origin", "1,2"], "--origin: must be X,Y,Z"),
-        (["--out", "x.npy", "--size", "2048"], "to OUT.zarr, or with --chunks, it is made in parts"),
+        (["--out", "x.npy", "--size", "2048"], "write to OUT.zarr, or pass --chunks, to compute the result in parts"),
         (["--out", "x.zarr", "--chunks", "0"], "--chunks: each side must be at least 1"),
     ],
 )
@@ -221,8 +221,14 @@ def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixt
     [
         (["design"], "40000 x 40000 has 1600000000 pixels, .*; texrs tiles creates an unbounded design"),
         (["tile"], "; texrs tiles creates an unbounded design, and writes windows of any size$"),
-        (["tiles"], "--size: .* more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
-        (["synthesize"], "more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
+        (
+            ["tiles"],
+            "--size: .* more than the limit of 268435456; write to OUT.zarr, or pass --chunks, to compute",
+        ),
+        (
+            ["synthesize"],
+            "more than the limit of 268435456; write to OUT.zarr, or pass --chunks, to compute the result in parts$",
+        ),
         (["perspective"], "more than the limit of 268435456$"),
     ],
 )
@@ -264,5 +270,5 @@ def test_voxels_of_results_lie_as_far_apart_as_those_of_examples(files: Path) ->
     texture = texrs.SolidTexture(STRIPES)
     texture.to_file(files / "c.vti", 8, spacing=apart)
     assert io.read_spacing(files / "c.vti") == apart
-    with pytest.raises(InvalidInput, match="spacing: .npy cannot store it"):
+    with pytest.raises(InvalidInput, match="spacing: cannot be stored in .npy"):
         texture.to_file(files / "c.npy", 8, spacing=apart)

@@ -144,7 +144,7 @@ REFUSED = {
     "tile in.png --overlap a": "--overlap: must be WIDTHxHEIGHT",
     "tile in.png --source-map s.png": "--source-map: must be a name that ends in .npz",
     "tile in.png --stages in.png": "in.png: is not a folder",
-    "tile in.png --stages out.png": "--stages: out.png is already the file of --out",
+    "tile in.png --stages out.png": "--stages: out.png is already the output of --out",
     "tile in.png --threads 0": "--threads: must be",
     "tile in.png hole.png": "--help",
     "tile": "--help",

@@ -50,10 +50,10 @@ def test_corners_are_x_and_y(here: Path) -> None:
     ("corners", "words"),
     [
         ("20,20 110,100 104,24 14,112", "the sides cross"),
-        ("20,20 24,150 100,110 112,14", "1 of the four leave the image; read as the x,y 20,20 24,150"),
-        ("20,20 24,150 100,110 112,14", "they fit as row,column, but x comes first"),
-        ("20,20 999,24 110,999 14,112", "2 of the four leave the image"),
-        ("20,20 104,24", "--corners: must be four places X,Y"),
+        ("20,20 24,150 100,110 112,14", "1 of the four are outside the image; as x,y, they are 20,20 24,150"),
+        ("20,20 24,150 100,110 112,14", "they would fit as row,column: exchange the numbers"),
+        ("20,20 999,24 110,999 14,112", "2 of the four are outside the image"),
+        ("20,20 104,24", "--corners: must be four points X,Y"),
         ("20,20 104,24 110,100 14", "--corners: must be X,Y"),
     ],
 )

@@ -27,7 +27,7 @@ def test_signals_leave_nothing_half_written(here: Path, number: int, code: int) 
         process.send_signal(number)
         rest = process.stderr.read()
     assert process.returncode == code
-    assert rest.splitlines()[-1] == b"texrs: stopped; nothing was left half-written"
+    assert rest.splitlines()[-1] == b"texrs: stopped; no incomplete files are left"
     assert b"Traceback" not in rest
     assert files(here) == before
 

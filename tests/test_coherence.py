@@ -92,7 +92,7 @@ def test_flat_exemplars_take_no_time():
     [
         ({"k": 0}, "k: must be an integer between 1 and 16"),
         ({"k": 17}, "k: must be an integer between 1 and 16"),
-        ({"n": 6}, "n: must be odd"),
+        ({"n": 6}, "n: must be an odd number"),
         ({"n": 51}, "n: must be smaller, because .* does not have 3 samples that are more than 25 apart"),
         ({"k": 16, "n": 11}, "n: must be smaller, because .* does not have 16 samples that are more than 5 apart"),
         ({"numbers": 9}, "numbers: must be 8 or 24"),

@@ -56,7 +56,7 @@ def test_files_stay_where_they_are(tmp_path: Path, textures: TextureDatabase, sa
     with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old image does not fit this one.
         textures.add(file, "buttons", replace=True, mask=~DOTS.mask, layout="disjoint")
     changed = textures["buttons"]
-    assert said == ["buttons: analysed again, because the entry is of another image"]
+    assert said == ["buttons: analysed again, because its entry belongs to another image"]
     assert (changed.image == DOTS.image[::-1]).all()
     assert (before.image == DOTS.image).all()
     file.unlink()
@@ -202,7 +202,7 @@ def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[
         assert answers == ["ok"] * count
     else:
         assert answers.count("ok") == 1
-        assert sum("name: one exists already, with another image" in answer for answer in answers) == count - 1
+        assert sum("name: one exists already with another image" in answer for answer in answers) == count - 1
         winner = answers.index("ok")
         assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
     # The manifest, the entry and the pixels belong to the same image.
@@ -271,7 +271,7 @@ def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatab
     ("call", "message"),
     [
         (lambda db: db.add(DOTS.image), "name: is required for an array"),
-        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: must be up to 100 letters, digits"),
+        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: must consist of 1 to 100 letters, digits"),
         (
             lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], layout="disjoint"),
             "name: dots exists already",
@@ -279,7 +279,7 @@ def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatab
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is not an option"),
         (lambda db: db["nobody"], "name: texture 'nobody' is not in"),
         (lambda db: db.matrix(cell=3), "cell: must be an integer"),
-        (lambda db: db.matrix([], []), "rows: must be at least one name"),
+        (lambda db: db.matrix([], []), "rows: must contain at least one name"),
         (lambda db: db.matrix(["dots"], ["nobody"]), "name: texture 'nobody' is not in"),
         (lambda db: db.matrix("dots"), "rows: must be a sequence of names"),
         (lambda db: db.remove("nobody"), "name: texture 'nobody' is not in"),
@@ -305,5 +305,7 @@ def test_folders_that_are_none(tmp_path: Path, textures: TextureDatabase) -> Non
     with pytest.raises(FileError, match="has version 9"):
         textures.list()
     (textures.path / "manifest.json").write_text('{"layout": 1, "textures": {}}')
-    with pytest.raises(FileError, match="has version 1, this texrs reads version 2; add the textures to a new folder"):
+    with pytest.raises(
+        FileError, match="has version 1, but this texrs reads version 2; add the textures to a new folder"
+    ):
         textures.list()

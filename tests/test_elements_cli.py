@@ -118,7 +118,7 @@ def test_database(here: Path, capsys: Capture) -> None:
     for command, message in (
         ("splice dots -o s.png", "NAME: must be two names for splice"),
         ("splice dots nobody -o new.png", "NAME: texture 'nobody' is not in"),
-        ("remove", "NAME: must be the name of a texture to remove"),
+        ("remove", "NAME: requires at least one texture to remove"),
         ("list --cell 32", "--cell: must be used with matrix, got list"),
         ("splice dots dots -o new.png --each all", "--each: must be used with matrix, got splice"),
     ):
@@ -154,9 +154,9 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse none.png -o before.npz", "none.png: does not exist"),
         ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: must be one of"),
         ("database db list", "db: the folder does not exist"),
-        ("database db add", "IMAGE: must be an image to add"),
-        ("database in.png add in.png", "in.png: a folder cannot be created"),
-        ("database db add in.png mask.png --name both", "IMAGE: must be one image with --name"),
+        ("database db add", "IMAGE: requires at least one image to add"),
+        ("database in.png add in.png", "in.png: must be a folder, or a new name"),
+        ("database db add in.png mask.png --name both", "IMAGE: must be a single image with --name"),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_what_was_there(

@@ -124,7 +124,7 @@ def test_verbs_take_either():
     for value, options, says in (
         (exemplar, {"axes": 3}, "exemplar: must be an Exemplar with axes=3, got one with axes=2"),
         (exemplar, {"minimum": 64}, "exemplar: each side must be at least 64, got shape (48, 48)"),
-        (np.array("weave"), {}, "exemplar: must be numbers"),
+        (np.array("weave"), {}, "exemplar: must contain integers, floats or bool"),
         (texrs.Exemplar(WEAVE[:12]).image, {"minimum": 16}, "exemplar: each side must be at least 16"),
     ):
         with pytest.raises(InvalidInput) as caught:

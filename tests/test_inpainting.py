@@ -335,7 +335,7 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
     [
         (PEBBLES, HOLE[1:], {}, "mask: must have shape (96, 112), got (95, 112)"),
         (PEBBLES, np.dstack([HOLE] * 5), {}, "mask: must have shape (96, 112), got (96, 112, 5)"),
-        (PEBBLES, HOLE.astype(complex), {}, "mask: must be bool, integers or floats"),
+        (PEBBLES, HOLE.astype(complex), {}, "mask: must contain bool, integers or floats"),
         (PEBBLES, NAN, {}, "mask: must be finite"),
         (
             PEBBLES,
@@ -375,7 +375,7 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
         (PEBBLES[:3], HOLE[40:43], {}, "image: each side must be at least 4"),
         (NAN, HOLE, {}, "image: must be finite, but 1 of 10752 values are NaN"),
         (np.zeros((8, 8, 8, 3)), np.zeros((8, 8)), {}, "a volume is not an image"),
-        (np.array([["a", "b"]]), HOLE, {}, "image: must be numbers"),
+        (np.array([["a", "b"]]), HOLE, {}, "image: must contain integers, floats or bool"),
     ],
 )
 def test_arguments_are_checked(image, hole, options, words):

@@ -114,8 +114,8 @@ def test_stores_that_hold_something_else(tmp_path: Path) -> None:
     (tmp_path / "bent.zarr" / "zarr.json").write_text("{")
     (tmp_path / "folder").mkdir()
     for name, kind, words in (
-        ("several", FileError, r"contains several arrays \(albedo, height\); name one, as in .*albedo"),
-        ("empty", FileError, "is an empty group"),
+        ("several", FileError, r"contains several arrays or groups \(albedo, height\); name one, as in .*albedo"),
+        ("empty", FileError, "is a Zarr group that contains no arrays"),
         ("line", FileError, "contains an array of 4, which is not a volume"),
         ("complex", FileError, "got complex64"),
         ("large", LimitExceeded, "more than the limit"),
@@ -198,7 +198,7 @@ GOOD = make_image_data("appended", "vtkZLibDataCompressor", "LittleEndian", "UIn
         ("a.vti", GOOD.replace(b"<Piece", b"<Part"), "reading failed|must be image data"),
         ("a.vti", GOOD[:-3000], "reading failed|is cut off"),
         ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="0 9', 1), "is cut off"),
-        ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="9 6', 1), "must have voxels"),
+        ("a.vti", GOOD.replace(b'<Piece Extent="0 6', b'<Piece Extent="9 6', 1), "must have at least one voxel"),
         ("a.vti", b'<?xml version="1.0"?><svg/>', "must be image data"),
     ],
 )

@@ -48,7 +48,7 @@ def test_tga_of_other_programs(tmp_path, channels):
         path.write_bytes(make.pillow(image, "TGA", **options))
         assert_array_equal(tio.read(path), image)
     path.rename(tmp_path / "a.dat")
-    with pytest.raises(FileError, match="must contain one of PNG, .* AVIF, JPEG XL"):
+    with pytest.raises(FileError, match="must be a file in one of the formats PNG, .* AVIF, JPEG XL"):
         tio.read(tmp_path / "a.dat")
 
 
@@ -149,7 +149,7 @@ def test_gif_is_written_with_up_to_256_colours(tmp_path):
     for image in (few, clear):
         tio.write(path, image)
         assert_array_equal(tio.read(path), image)
-    with pytest.raises(InvalidInput, match=r"\.gif cannot store \d+ colours, only 256"):
+    with pytest.raises(InvalidInput, match=r"\.gif cannot store \d+ colours, but only 256"):
         tio.write(path, np.random.default_rng(0).integers(0, 256, (24, 20, 3), np.uint8))
     clear[:5, :5, 3] = 128
     with pytest.raises(InvalidInput, match="more than one transparent colour"):
@@ -324,14 +324,16 @@ def test_pages_of_other_sizes_are_reported(tmp_path):
     tifffile.imwrite(path, COLOURS, photometric="rgb", metadata=None)
     tifffile.imwrite(path, make.picture((9, 8)), append=True, metadata=None)
     with pytest.warns(
-        InputWarning, match=r"pages.tif: 1 of 2 pages not used: they do not form a stack with the first page"
+        InputWarning, match=r"pages.tif: 1 of 2 pages not used, because they do not form a stack with the first page"
     ):
         assert_array_equal(tio.read(path), COLOURS)
     # Pages of the same size do not always form a stack.
     with tifffile.TiffWriter(path) as writer:
         for _ in range(3):
             writer.write(COLOURS, photometric="rgb")
-    with pytest.warns(InputWarning, match=r"2 of 3 pages not used: they do not form a stack with the first page"):
+    with pytest.warns(
+        InputWarning, match=r"2 of 3 pages not used, because they do not form a stack with the first page"
+    ):
         assert_array_equal(tio.read(path), COLOURS)
     # A page with a thumbnail is not reported, because it shows the same image.
     tifffile.imwrite(path, COLOURS, photometric="rgb", metadata=None)

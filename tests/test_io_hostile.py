@@ -100,7 +100,7 @@ def test_corrupt_files(files, name, tmp_path, capfd):
     ("content", "says"),
     [
         (b"", r"is empty \(0 bytes\)"),
-        (b"this is no image\n" * 20, "must contain one of PNG"),
+        (b"this is no image\n" * 20, "must be a file in one of the formats PNG"),
         (b"\x89PNG\r\n\x1a\n", "cut off"),
         (b"\xff\xd8\xff", "cut off"),
         (b"\xff\xd8\xff\xe0\0\0", "cut off, corrupt"),
@@ -127,7 +127,7 @@ def test_corrupt_files(files, name, tmp_path, capfd):
         (make.npy("{'descr': '|b1', 'fortran_order': False, 'shape': (1, 1)}", b"\7"), "corrupt"),
         (make.npy("__import__('os').system('true')"), "header cannot be read"),
         (make.npy("(" * 4000), "header cannot be read"),
-        (make.npz({}), "one of PNG|no arrays"),
+        (make.npz({}), "one of the formats PNG|no arrays"),
         (make.npz({"a.txt": b"text"}), "no arrays"),
         (make.npz({"a.npy": b"text"}), "not a NumPy file"),
         (
@@ -164,7 +164,7 @@ def test_missing_files_and_folders(tmp_path):
             read(tmp_path)
         with pytest.raises(FileError, match="cannot be opened"):
             read(tmp_path / "file" / "below.png")
-        with pytest.raises(FileError, match="must be a name of at most 255 bytes"):
+        with pytest.raises(FileError, match="each name in the path must have at most 255 bytes"):
             read(tmp_path / ("x" * 300))
         with pytest.raises(FileError, match="null"):
             read("a\0b.png")

@@ -63,7 +63,7 @@ def test_every_verb_compares_what_it_needs_before_it_begins(verb, said, monkeypa
 def test_every_verb_stops_when_its_time_is_up(verb):
     with (
         limits.context(seconds=1e-9),
-        pytest.raises(LimitExceeded, match=r"the limit of 1e-09 s was reached in the stage"),
+        pytest.raises(LimitExceeded, match=r"the time limit of 1e-09 s was reached in the stage"),
     ):
         VERBS[verb]()
 
@@ -132,7 +132,7 @@ def test_seconds_of_the_environment_are_those_of_each_call(monkeypatch):
         heed = listen(None)
         heed("begin", 0.0)
         time.sleep(0.06)
-        with pytest.raises(LimitExceeded, match="0.05 s was reached in the stage 'end', at 50% of its work"):
+        with pytest.raises(LimitExceeded, match="0.05 s was reached in the stage 'end', at 50% of its progress"):
             heed("end", 0.5)
 
 
@@ -191,7 +191,7 @@ def test_what_has_no_estimate_is_refused(wrong):
     [
         ("--pixel-limit 9000", "--size: 96 x 96 has 9216 pixels, more than the limit of 9000"),
         ("--memory-limit 1M", "--size: needs"),
-        ("--time-limit 1e-9", "the limit of 1e-09 s was reached"),
+        ("--time-limit 1e-9", "the time limit of 1e-09 s was reached"),
         ("--time-limit 0", "--time-limit: must be a number of seconds above 0, got 0"),
         ("--pixel-limit 0", "--pixel-limit: must be a number of pixels"),
         ("--memory-limit some", "--memory-limit: must be a number of bytes"),

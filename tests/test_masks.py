@@ -62,14 +62,17 @@ MASKS: dict[str, tuple[Callable[[], object], str]] = {
     "white": (lambda: WHITE, ""),
     "0 and 1": (lambda: DISC.astype(np.uint8), ""),
     "0 and 1 of 64 bits": (lambda: DISC.astype(np.int64), ""),
-    "0 and 3": (lambda: DISC.astype(np.uint8) * 3, "read as numbers, because the largest is 3 of 255"),
-    "labels": (lambda: DISC * (1 + ROWS % 7).astype(np.uint8), "each value other than 0 is marked"),
+    "0 and 3": (
+        lambda: DISC.astype(np.uint8) * 3,
+        "read as numbers, because the largest value is 3, and white would be 255",
+    ),
+    "labels": (lambda: DISC * (1 + ROWS % 7).astype(np.uint8), "values other than 0 are marked"),
     "16 bits": (lambda: DISC.astype(np.uint16) * 65535, ""),
     "shares": (lambda: DISC.astype(np.float32), ""),
     "floats to 255": (lambda: DISC * 255.0, ""),
     "noise of 2 in black and white": (lambda: np.where(DISC, 253, 0).astype(np.uint8) + NOISE, ""),
     "red on black": (lambda: np.dstack([WHITE, 0 * WHITE, 0 * WHITE]), ""),
-    "grey noise and dark strokes": (lambda: np.where(DISC, 90, 0).astype(np.uint8) + NOISE, "each value from 46 on"),
+    "grey noise and dark strokes": (lambda: np.where(DISC, 90, 0).astype(np.uint8) + NOISE, "values of at least 46"),
     "opaque alpha": (lambda: np.dstack([WHITE] * 3 + [np.full(SIZE, 255, np.uint8)]), ""),
     "alpha that is nowhere": (lambda: np.dstack([WHITE] * 3 + [np.zeros(SIZE, np.uint8)]), ""),
     "black stroke on a layer": (lambda: as_layer((0, 0, 0), WHITE), "read as a layer"),
@@ -78,7 +81,7 @@ MASKS: dict[str, tuple[Callable[[], object], str]] = {
     "grey and alpha": (lambda: np.dstack([0 * WHITE, WHITE]), "read as a layer"),
     "black and white, in part transparent": (
         lambda: np.dstack([WHITE] * 3 + [np.where(COLUMNS < 90, 255, 0).astype(np.uint8)]),
-        "read as a mask in black and white with transparent parts",
+        "read as a black and white mask; its transparent parts",
     ),
     "the picture itself with the hole erased": (
         lambda: np.dstack([samples.load("pebbles", size=SIZE).image, 255 - WHITE]),
@@ -112,7 +115,7 @@ def test_files_are_read_as_arrays_and_give_their_name(tmp_path: Path) -> None:
     # All other masks of texrs are read in the same way.
     np.testing.assert_array_equal(as_mask(tmp_path / "stroke.png", "ground", SIZE), DISC)
     np.testing.assert_array_equal(as_mask(Mask(tmp_path / "stroke.png", invert=True), "ground", SIZE), ~DISC)
-    with pytest.raises(InvalidInput, match="ground: cannot have a feather"):
+    with pytest.raises(InvalidInput, match="ground: must not have a feather"):
         as_mask(Mask(WHITE, feather=2), "ground", SIZE)
 
 
@@ -130,7 +133,7 @@ def test_threshold_and_grey() -> None:
     soft = np.rint(255 * np.clip((30 - FAR) / 30, 0, 1)).astype(np.uint8)
     usual, said = read(soft)
     np.testing.assert_array_equal(usual, soft >= 128)
-    assert "less than half white or opaque, so not marked" in said[0]
+    assert "dark grey or mostly transparent, so they are not marked" in said[0]
     for share in (0.0, 0.1, 0.9, 1.0):
         marked, said = read(Mask(soft, threshold=share))
         np.testing.assert_array_equal(marked, (soft >= share * 255) & (soft > 0))
@@ -169,7 +172,7 @@ def test_grow_goes_across_cyclic_borders() -> None:
         ),
         (lambda: read(np.full(SIZE, np.nan)), "mask: must be finite"),
         (lambda: read(np.dstack([WHITE] * 5)), "mask: must have shape"),
-        (lambda: read(WHITE.astype(complex)), "mask: must be bool, integers or floats"),
+        (lambda: read(WHITE.astype(complex)), "mask: must contain bool, integers or floats"),
         (lambda: texrs.inpaint(BRICKS, 0 * WHITE), "mask: marks nothing, so there is nothing to fill"),
         (lambda: texrs.inpaint(BRICKS, Mask(WHITE, grow=-20)), "mask: marks nothing"),
         (lambda: texrs.inpaint(BRICKS, Mask(DISC | True, invert=True)), "mask: marks nothing"),
@@ -392,7 +395,7 @@ def test_georeference_goes_through(here: Path, capsys: Capture, hole: str) -> No
 
 def test_georeference_that_is_not_written_is_reported(here: Path, capsys: Capture) -> None:
     assert main(["inpaint", "heights.tif", "hole.png", "-o", "out.exr"]) == 0
-    assert "heights.tif: its georeference is not written, because only TIFF holds it" in capsys.readouterr().err
+    assert "heights.tif: its georeference is not written, because only TIFF files store it" in capsys.readouterr().err
     assert main(["inpaint", "heights.tif", "hole.png", "-o", "other.exr", "--strict"]) == 2
     assert not Path("other.exr").exists()
     # A design has pixels at other positions, so it does not keep the georeference.
@@ -412,7 +415,10 @@ def test_georeference_goes_through_tile_if_the_size_stays(here: Path, capsys: Ca
 
 
 def test_nodata_that_is_used_as_values_is_reported(here: Path, capsys: Capture) -> None:
-    words = f"heights.tif: its nodata value -9999 is not used, so {DISC.sum()} pixels count as data; texrs inpaint fills them"
+    words = (
+        f"heights.tif: its nodata value -9999 is ignored, so {DISC.sum()} pixels with this value are used as data; "
+        "texrs inpaint can fill them"
+    )
     with pytest.warns(InputWarning, match=words):
         made = texrs.tile("heights.tif")
     assert made.report["ignored"] == [words]
@@ -486,7 +492,7 @@ def test_all_masks_of_commands_are_read_alike(here: Path, capsys: Capture, comma
     assert main([*command.format("drawn.png").split(), "-o", out]) == 0
     said = capsys.readouterr().err
     assert "drawn.png: read as a layer" in said
-    assert f"drawn.png: read as a mask that marks {100 * drawn.mean():.3g} % of it" in said
+    assert f"drawn.png: read as a mask that marks {100 * drawn.mean():.3g} % of the image" in said
 
 
 def test_warnings_of_python_are_only_of_what_is_not_used() -> None:
@@ -514,7 +520,7 @@ def test_words_after_a_name_say_how_a_mask_is_read(here: Path, capsys: Capture) 
     capsys.readouterr()
     assert main([*f"{view} grown.png".split(), "--ground", "unseen.png:invert,grow=-4"]) == 0
     share = float(np.mean(np.arange(len(seen)) >= 16))
-    assert f"unseen.png: read as a mask that marks {100 * share:.3g} % of it" in capsys.readouterr().err
+    assert f"unseen.png: read as a mask that marks {100 * share:.3g} % of the image" in capsys.readouterr().err
     Path("other").mkdir()
     assert (
         main(

@@ -241,7 +241,7 @@ def test_bad_materials_are_refused() -> None:
         with pytest.raises(InvalidInput) as caught:
             Material(maps, **options)  # type: ignore[arg-type]
         assert words in str(caught.value)
-    with pytest.raises(InvalidInput, match="must all be materials, or none of them"):
+    with pytest.raises(InvalidInput, match="must either all be materials or all be images"):
         texrs.design([STONES, picture], 64)
     with pytest.raises(InvalidInput, match="the same maps"):
         texrs.design([STONES, Material({"albedo": picture})], 64)

@@ -181,7 +181,7 @@ def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
         f"{path}: Puddles not used: the name gives no role",
     ]
     assert back.notices.assumed == [
-        f"{path}: Combined: colours are not divided by alpha, because clear pixels have colours",
+        f"{path}: Combined: colours are not divided by alpha, because pixels with an alpha of 0 are not black",
         f"{path}: Depth, Mist read as other: a distance from the camera is not a height",
         f"{path}: IndexOB read as labels",
         f"{path}: Normal read as tangent-space normals, y up; a render has them in world space",
@@ -313,12 +313,14 @@ def test_colours_are_multiplied_by_alpha_in_files(clear: bool, tmp_path: Path) -
 def test_colours_under_no_alpha_are_reported(tmp_path: Path) -> None:
     leaf = draw_leaf("float32", clear=False)
     leaf[:7, :, 3] = 0
-    with pytest.warns(InputWarning, match=r"albedo: colours of 33 % of the pixels, whose alpha is 0, are not kept"):
+    with pytest.warns(InputWarning, match=r"albedo: colours of 33 % of the pixels, whose alpha is 0, are lost"):
         Material({"albedo": leaf}).save_exr(tmp_path / "a.exr")
     straight = {f"L.Color.{letter}": leaf[..., k].copy() for k, letter in enumerate("RGBA")}
     back = Material.read(write(tmp_path / "b.exr", [({}, straight)]))
     assert (back["L.Color"].pixels == leaf).all()
-    assert "colours are not divided by alpha, because clear pixels have colours" in back.notices.assumed[0]
+    assert (
+        "colours are not divided by alpha, because pixels with an alpha of 0 are not black" in back.notices.assumed[0]
+    )
 
 
 def test_a_picture_with_alpha_changes_between_exr_and_others(

@@ -126,7 +126,7 @@ def test_what_texrs_does_not_read(manager: Any, tmp_path: Path) -> None:
     assert _napari.get_reader(str(tmp_path / "a.txt")) is None
     assert _napari.get_reader(str(tmp_path / "folder")) is None
     (tmp_path / "bad.npy").write_bytes(b"no")
-    with pytest.raises(FileError, match="must contain one of"):
+    with pytest.raises(FileError, match="must be a file in one of"):
         _napari.read(str(tmp_path / "bad.npy"))
 
 

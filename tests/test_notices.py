@@ -81,7 +81,7 @@ def test_variants_report_what_is_noticed_while_they_are_made() -> None:
     several = list(texrs.design_variants(material, 2, 48))
     assert len(several) == 2
     for made in several:
-        noticed = "maps: few colours, so pixels are copied from the nearest pixel and not corrected"
+        noticed = "maps: have only a few colours, so pixels are neither interpolated nor corrected"
         assert any(text.startswith(noticed) for text in made.report["assumed"])
 
 

@@ -60,10 +60,7 @@ def test_no_verb_makes_a_colour(verb):
     made = VERBS[verb](ART)
     assert find_colours(made.image) <= find_colours(ART)
     assert made.report["palette"] == len(find_colours(ART))
-    assert any(
-        "colours, so pixels are copied from the nearest pixel and not corrected" in line
-        for line in made.report["assumed"]
-    )
+    assert any("colours, so pixels are neither interpolated nor corrected" in line for line in made.report["assumed"])
     if "several" not in verb and "another" not in verb:
         np.testing.assert_array_equal(texrs.apply(made.source_map, ART), made.image)
 
@@ -146,7 +143,7 @@ def test_the_command_says_it_and_can_be_told_otherwise(tmp_path, capsys):
     io.write(tmp_path / "a.png", ART)
     words = ["design", str(tmp_path / "a.png"), "-o", str(tmp_path / "out.png"), "--size", "80"]
     assert main(words) == 0
-    assert "a.png: 4 colours, so pixels are copied from the nearest pixel" in capsys.readouterr().err
+    assert "a.png: has only 4 colours, so pixels are neither interpolated" in capsys.readouterr().err
     assert main([*words, "--no-palette", "--force"]) == 0
     assert "colours" not in capsys.readouterr().err
     assert len(find_colours(io.read(tmp_path / "out.png"))) > 4
@@ -168,7 +165,7 @@ def test_unbounded_textures_keep_few_colours():
     seen = find_colours(ART)
     with collect() as notices:
         plane = texrs.PlaneTexture(ART, field="circular", seed=1)
-    assert any("few colours, so pixels are copied from the nearest pixel" in line for line in notices.assumed)
+    assert any("few colours, so pixels are not interpolated" in line for line in notices.assumed)
     assert find_colours(plane[10:74, -30:40]) <= seen
     smooth = texrs.PlaneTexture(ART, field="circular", seed=1, interpolation="cubic")
     assert not find_colours(smooth[10:74, -30:40]) <= seen

@@ -139,7 +139,7 @@ def test_another_verb_or_another_example_asks(here: Path, capsys: Capture) -> No
     capsys.readouterr()
     before = files(here)
     assert main(["tile", "other.png", "-o", "out.png"]) == 2
-    assert "was made from in.png" in capsys.readouterr().err
+    assert "was made with other arguments: in.png" in capsys.readouterr().err
     assert main(["design", "in.png", *SMALL, "-o", "out.png"]) == 2
     assert "was made by texrs tile" in capsys.readouterr().err
     assert files(here) == before
@@ -235,8 +235,8 @@ def test_variants_that_are_done_stay(here: Path, number: int) -> None:
     assert process.returncode == (130 if number == signal.SIGINT else -9)
     if number == signal.SIGINT:
         lines = rest.splitlines()
-        assert lines[-2] == "texrs: stopped; nothing was left half-written"
-        assert lines[-1].startswith("texrs: what was done is kept: v-0.png, v-1.png")
+        assert lines[-2] == "texrs: stopped; no incomplete files are left"
+        assert lines[-1].startswith("texrs: files that were finished before are kept: v-0.png, v-1.png")
         assert not list(here.glob(".texrs*"))
     after = {n: c for n, c in files(here).items() if not Path(n).name.startswith(".texrs")}
     assert {n: after[n] for n in before} == before
@@ -345,7 +345,7 @@ def test_what_changed_is_named(here: Path, capsys: Capture) -> None:
     whole = Path("r.png").read_bytes()
     io.write("r.png", io.read("r.png"))
     assert main(["rerun", "r.png"]) == 2
-    assert "has no record of how it was made" in capsys.readouterr().err
+    assert "has no record of the command that made it" in capsys.readouterr().err
     Path("r.png").write_bytes(whole)
     picture = io.read("in.png")
     io.write("in.png", picture[::-1].copy())

@@ -315,7 +315,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     np.testing.assert_array_equal(io.read(out), texrs.remove(picture, marked, view=views).image)
     capsys.readouterr()
     for more, words in (
-        (["--slant", "50"], "--slant: must be one for each of 2 grounds"),
+        (["--slant", "50"], "--slant: must be given for each of 2 planes"),
         (["--slant", "fifty", "--slant", "3"], "--slant: must be a number, or found"),
         (["--ground", "found", "--ground", "found"], "--ground: must be given for all but one"),
     ):

@@ -320,7 +320,7 @@ def test_bad_names_seeds_and_solids_are_refused() -> None:
         samples.load("coins", seed=1)
     with pytest.raises(ValueError, match="seed: must be an integer"):
         samples.dots((64, 64), seed=-1)
-    with pytest.raises(ValueError, match=r"size: must be \(planes, rows, columns\)"):
+    with pytest.raises(ValueError, match=r"size: must be an integer or integers \(planes, rows, columns\)"):
         samples.stripes((64, 64))
     with pytest.raises(ValueError, match="at least 32"):
         samples.wood_solid((64, 64, 8))

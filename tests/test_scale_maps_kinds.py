@@ -169,5 +169,5 @@ def test_descriptions_come_back(tmp_path):
         io.write(tmp_path / name, np.zeros((4, 5), np.uint8))
         assert io.read_description(tmp_path / name) is None
     assert io.read_description(tmp_path / "none.png") is None
-    with pytest.raises(InvalidInput, match="description: must be ASCII"):
+    with pytest.raises(InvalidInput, match="description: must be an ASCII string"):
         io.write(tmp_path / "a.png", np.zeros((4, 5), np.uint8), description="\N{GREEK SMALL LETTER PI}")

@@ -116,7 +116,7 @@ def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
     np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
     wrong = "synthesize in.png -o no.png --size 32 --guide-exemplar mine.tif --guide-output theirs.tif -q"
     assert main(wrong.split()) == 2
-    assert "mine.tif and theirs.tif: the map of the output must be" in capsys.readouterr().err
+    assert "mine.tif and theirs.tif: the map of the output must contain" in capsys.readouterr().err
 
 
 def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
@@ -133,13 +133,16 @@ WRONG = [
     ("solid v.npy -o out.tif --size 20x20", "--size: must be WIDTHxHEIGHTxDEPTH, as in 128x96x64, or one number"),
     ("solid v.npy -o out.tif --size 0", "--size: each side must be at least 1"),
     ("solid v.npy -o out.tif --size 10000", "--size: 10000 x 10000 x 10000 has 1000000000000 pixels"),
-    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "MB of memory, more than the limit of 9.4 MB; to OUT.zarr"),
+    (
+        "solid v.npy -o out.tif --size 64 --memory-limit 9M",
+        "MB of memory, more than the limit of 9.4 MB; write to OUT.zarr",
+    ),
     ("solid v.npy -o out.tif --memory-limit lots", "--memory-limit: must be a number of bytes, as in 900M"),
     ("solid v.npy -o out.tif --field circles", "--field: must be one of"),
     ("solid v.npy -o out.tif --field zigzag:angle=x", "--field: angle must be a number"),
     ("solid v.npy -o out.tif --size 20 --field scale_ramp:start=0.125,stop=0.12", "--field: scale_ramp: stop"),
     ("solid v.npy -o out.tif --field none.npz", "none.npz: does not exist"),
-    ("solid v.npy -o out.tif --wrap xxy", "--wrap: must be letters of x, y and z"),
+    ("solid v.npy -o out.tif --wrap xxy", "--wrap: must be default, none, or some of the letters x, y and z"),
     ("solid v.npy -o out.tif --quality best", "--quality: must be one of preserve, fast, optimise; got 'best'"),
     ("solid v.npy -o out.tif --method literal", "--method: must be one of default, paper, paper-compensated"),
     ("solid v.npy -o out.tif --interpolation best", "--interpolation: must be one of default, nearest, linear, cubic"),

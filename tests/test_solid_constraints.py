@@ -123,13 +123,16 @@ VALUES = texrs.Constraints(mask=np.ones((40, 40), bool), values=np.zeros((40, 40
         ({"constraints": MAP}, "constraints: must be a texrs.Constraints, got ndarray"),
         (
             {"guide": texrs.Guide(exemplar=np.zeros((7, 1)), output=0)},
-            "guide: the map of the exemplar must be finite numbers",
+            "guide: the map of the exemplar must contain numbers and broadcast",
         ),
         (
             {"guide": texrs.Guide(exemplar=0, output=MAP)},
-            "guide: the map of the output must be finite numbers that broadcast",
+            "guide: the map of the output must contain numbers and broadcast",
         ),
-        ({"guide": texrs.Guide(exemplar=0, output=0), "constraints": VALUES}, "guide: cannot be combined with values"),
+        (
+            {"guide": texrs.Guide(exemplar=0, output=0), "constraints": VALUES},
+            "guide: cannot be combined with constraints that have values",
+        ),
         ({"guide": texrs.Guide(exemplar=0.0, output=0.0), "method": "paper"}, "guide: cannot be combined with method"),
     ],
 )
@@ -144,10 +147,14 @@ def test_wrong_maps_get_a_sentence(more, says):
         (
             texrs.Guide,
             {"exemplar": 0, "output": np.full((40, 40), np.nan)},
-            "guide: the map of the output must be finite",
+            "guide: the map of the output must contain finite",
         ),
-        (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar must be finite numbers"),
-        (texrs.Guide, {"exemplar": 0, "output": [[1], [1, 2]]}, "guide: the map of the output must be finite numbers"),
+        (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar must contain finite numbers"),
+        (
+            texrs.Guide,
+            {"exemplar": 0, "output": [[1], [1, 2]]},
+            "guide: the map of the output must contain finite numbers",
+        ),
         (texrs.Guide, {"exemplar": 0, "output": 0, "weight": -1}, "weight: must be a number between 0 and 100"),
         (texrs.Constraints, {"mask": MAP > 0}, "constraints: must have either values or coordinates"),
         (

@@ -151,13 +151,13 @@ def test_wrong_arrays_get_a_sentence():
     appearance, region = exemplar(2), region_of(2)
     frames, good = to_fixed(None, region), scattered(exemplar(2), region_of(2))
     for call, says in (
-        (lambda: appearance.correct(good[:-1], region, frames), "places: must be int32 of 286 numbers"),
+        (lambda: appearance.correct(good[:-1], region, frames), "places: must be 286 numbers of int32"),
         (lambda: appearance.correct(good, region, frames[:, :1]), "frames"),
         (lambda: appearance.correct(good, region, np.repeat(frames, 3, axis=0)), "frames"),
         (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "held"),
         (lambda: appearance.correct(good, region, frames, reach=3), "reach: must be an integer between 1 and 2"),
         (lambda: appearance.correct(good, region, frames, vote=3), "vote: must be an integer between 0 and 2"),
-        (lambda: appearance.correct(good, region_of(3), frames), "region: must have the 2 axes"),
+        (lambda: appearance.correct(good, region_of(3), frames), "region: must have 2 axes"),
         (lambda: appearance.blocks(region, frames, cell=1), "cell: must be an integer between 2"),
         (lambda: appearance.blocks(region, frames, contrast=2), "contrast: must be a number between 0 and 1"),
         (lambda: Appearance(np.zeros((4, 4)), axes=2), "must have sides of at least 6"),

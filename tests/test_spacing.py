@@ -164,7 +164,8 @@ def test_constraints_lie_at_places_in_space(tmp_path: Path, capsys: pytest.Captu
     io.write_volume(tmp_path / "mask.nrrd", near[:8], spacing=(1.4, 1.4, 1.4))
     assert main(["solid", source, "-o", out, *words, "--quality", "fast"]) == 2
     assert (
-        "mask.nrrd: must span 16.8 x 16.8 x 22.4 as the result does, got 16.8 x 16.8 x 11.2" in capsys.readouterr().err
+        "mask.nrrd: must have the extent of the result, 16.8 x 16.8 x 22.4, got 16.8 x 16.8 x 11.2"
+        in capsys.readouterr().err
     )
 
 

@@ -339,7 +339,7 @@ def test_smallest_pictures(shape):
         ({"overlap": True}, "overlap: must be an integer"),
         ({"size": 30, "overlap": 4}, "overlap: cannot be combined with size"),
         ({"size": (1, 30)}, "size: must have at least 2 rows to wrap them, got 1"),
-        ({"size": (30, 40, 3)}, "size: must be (rows, columns)"),
+        ({"size": (30, 40, 3)}, "size: must be an integer or integers (rows, columns)"),
         ({"size": 0}, "size: each side must be at least 1"),
         ({"wrap": "xy"}, "wrap: must be"),
         ({"wrap": (True,)}, "wrap: must be"),
@@ -358,7 +358,7 @@ def test_arguments_are_checked(options, words):
         (np.zeros((1, 8), np.uint8), "at least 2 rows"),
         (np.zeros((0, 8), np.uint8), "image: each side"),
         (np.full((8, 8), np.nan), "NaN"),
-        ([["a"]], "image: must be numbers"),
+        ([["a"]], "image: must contain integers, floats or bool"),
     ],
 )
 def test_images_are_checked(image, words):

@@ -67,9 +67,9 @@ def test_turntables_and_samples(here, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ("v.npy -o out.png --at depth=3", "--at: must be x="),
-        ("v.npy -o out.png --at plane=3.5", "--at: must be x="),
-        ("v.npy -o out.png --at 3,4", "--at: must be x="),
+        ("v.npy -o out.png --at depth=3", "--at: must be a slice such as"),
+        ("v.npy -o out.png --at plane=3.5", "--at: must be a slice such as"),
+        ("v.npy -o out.png --at 3,4", "--at: must be a slice such as"),
         ("v.npy -o out.png --at plane=99", "--at: must be an integer between -32 and 31, got 99"),
         ("v.npy -o out.png --at 99,4,3", "--at: must be an integer between -40 and 39"),
         ("v.npy -o out.png --oblique 1,1,0", "--oblique: must be X,Y,Z/X,Y,Z"),

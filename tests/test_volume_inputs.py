@@ -51,7 +51,7 @@ def test_missing_and_unlike_slices_are_named(tmp_path):
         np.testing.assert_array_equal(tio.read_volume(scan), volume)
     tio.write(scan / "label_1.png", volume[0])
     tio.write(scan / "label_2.png", volume[0])
-    with pytest.raises(FileError, match=r"contains label_N.png and scan_N.png numbered slices; a volume needs one"):
+    with pytest.raises(FileError, match=r"must contain one series of numbered slices, got label_N.png and scan_N.png"):
         tio.read_volume(scan)
     tio.write(scan / "scan_017.png", volume[0])
     with pytest.raises(FileError, match="scan_017.png and scan_17.png have the same number"):
@@ -103,17 +103,17 @@ def test_samples_without_a_header(tmp_path, dtype):
 def test_samples_without_a_header_need_what_they_are(tmp_path):
     np.zeros(96**3, np.uint8).tofile(tmp_path / "scan.raw")
     scan = tmp_path / "scan.raw"
-    with pytest.raises(FileError, match=r"scan.raw: has no header; write .* as in .*scan.raw:96x96x96:uint8"):
+    with pytest.raises(FileError, match=r"scan.raw: has no header; add .* as in .*scan.raw:96x96x96:uint8"):
         tio.read_volume(scan)
-    with pytest.raises(FileError, match=r"96 x 96 x 96 of uint16 need 1769472 bytes, but the file has 884736"):
+    with pytest.raises(FileError, match=r"96 x 96 x 96 samples of uint16 need 1769472 bytes, but the file has 884736"):
         tio.read_volume(f"{scan}:96x96x96:uint16")
     with pytest.raises(
         FileError, match=r"the type of the samples must follow the size, as in .*scan.raw:96x96x96:uint16"
     ):
         tio.read_volume(f"{scan}:96x96x96")
     for options, says in (
-        ({"shape": (96, 96, 96)}, "dtype: must be given with shape"),
-        ({"dtype": "uint8"}, "shape: must be given with dtype"),
+        ({"shape": (96, 96, 96)}, "dtype: must be given together with shape"),
+        ({"dtype": "uint8"}, "shape: must be given together with dtype"),
         ({"shape": (96, 96), "dtype": "uint8"}, "shape: "),
         ({"shape": (96, 96, 0), "dtype": "uint8"}, "shape: "),
         ({"shape": (96, 96, 96), "dtype": "rgb"}, "dtype: must be one of uint8"),
@@ -192,7 +192,7 @@ def test_commands_read_folders_and_headerless_samples(tmp_path, capsys, monkeypa
     # Data that a format cannot state are reported.
     tio.write_volume("b.nrrd", volume, spacing=(2, 1, 1))
     assert main(["solid", "b.nrrd", "-o", "b.npy", "--size", "20", "--quality", "fast"]) == 0
-    assert "b.nrrd: the spacing is not kept, because .npy of uint8 cannot state it" in capsys.readouterr().err
+    assert "b.nrrd: the spacing is not kept, because .npy of uint8 cannot store it" in capsys.readouterr().err
     assert main(["solid", "b.nrrd", "-o", "c.npy", "--size", "20", "--quality", "fast", "--strict", "-q"]) == 2
     assert not Path("c.npy").exists()
 

@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 # The command has finished or cleaned up, and its exit code is final, so ignore a late Ctrl-C.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        print("texrs: stopped; nothing was left half-written", file=sys.stderr)
+        print("texrs: stopped; no incomplete files are left", file=sys.stderr)
         return 130
 
 

@@ -45,7 +45,7 @@ def multiply(pixels: Array, name: str) -> Array:
     if lost.any():
         share = f"{100 * lost.mean():.2g} % of the pixels"
         ignore(
-            f"{name}: colours of {share}, whose alpha is 0, are not kept: EXR files have colours multiplied by alpha"
+            f"{name}: colours of {share}, whose alpha is 0, are lost, because EXR stores colours multiplied by alpha"
         )
     wide = np.result_type(pixels.dtype, np.float32)
     return np.concatenate([(colours.astype(wide) * alpha).astype(pixels.dtype), alpha], axis=-1)
@@ -68,7 +68,7 @@ def divide(pixels: Array, name: str) -> Array:
         return pixels
     clear = alpha[..., 0] <= 0
     if clear.any() and (np.abs(colours[clear]) >= CLEAR).any(axis=-1).mean() > MOST:
-        assume(f"{name}: colours are not divided by alpha, because clear pixels have colours")
+        assume(f"{name}: colours are not divided by alpha, because pixels with an alpha of 0 are not black")
         return pixels
     assume(f"{name}: colours are divided by alpha, because EXR files store them multiplied by alpha")
     return undo(pixels)

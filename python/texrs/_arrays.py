@@ -114,14 +114,17 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     """
     array = as_ndarray(value, name, axes=axes)
     if array.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: must be numbers (integers, floats or bool), got dtype {array.dtype}")
+        raise InvalidInput(f"{name}: must contain integers, floats or bool, got dtype {array.dtype}")
     if array.dtype.kind == "f" and array.dtype.itemsize not in (2, 4, 8):
         raise InvalidInput(f"{name}: floats must have 16, 32 or 64 bits, got {array.dtype}")
     _check_order(array.shape, name, axes)
     if array.ndim not in (axes, axes + 1):
-        shapes = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
+        shapes = (
+            "(rows, columns) or (rows, columns, channels)",
+            "(planes, rows, columns) or (planes, rows, columns, channels)",
+        )[axes - 2]
         hint = "; a volume is not an image" if array.ndim == 4 and axes == 2 else ""
-        raise InvalidInput(f"{name}: must have shape {shapes}, with any channels last, got shape {array.shape}{hint}")
+        raise InvalidInput(f"{name}: must have shape {shapes}, got shape {array.shape}{hint}")
     if array.ndim == axes:
         array = array[..., np.newaxis]
     elif array.shape[-1] > 64:
@@ -149,8 +152,8 @@ def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
         )
     if axes == 2:
         raise InvalidInput(
-            f"{name}: shape {shape} is a batch of {shape[0]} with channels first; give one image at a time, channels last: "
-            f"numpy.moveaxis({name}[0], 0, -1)"
+            f"{name}: must be one image with its channels last, got shape {shape}, a batch of {shape[0]} images with "
+            f"channels first; use numpy.moveaxis({name}[0], 0, -1)"
         )
 
 
@@ -242,7 +245,7 @@ def check_finite(array: Array, name: str) -> None:
     bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
     if bad:
         raise InvalidInput(
-            f"{name}: must be finite, but {bad} of {array.size} values are NaN or infinite as {array.dtype}"
+            f"{name}: must be finite, but {bad} of {array.size} values are NaN or infinite (dtype {array.dtype})"
         )
 
 
@@ -307,7 +310,7 @@ def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     The mask can be an array of bool or integers (0 means False), a file, an image of PIL, or a `texrs.Mask`.
     """
     if isinstance(value, Mask) and value.feather:
-        raise InvalidInput(f"{name}: cannot have a feather, which is only for masks of holes to fill")
+        raise InvalidInput(f"{name}: must not have a feather, which is only available for masks of holes")
     if isinstance(value, Mask | str | PathLike) or is_pillow(value):
         return mark(value, name, shape)
     given = as_ndarray(value, name, axes=len(shape))

@@ -19,4 +19,6 @@ def check_call(function: Callable[..., object], name: str, *arguments: str) -> N
     try:
         signature.bind(*arguments)
     except TypeError:
-        raise InvalidInput(f"{name}: must accept the call {name}({', '.join(arguments)}), got {function!r}") from None
+        raise InvalidInput(
+            f"{name}: must be a function that accepts the call {name}({', '.join(arguments)}), got {function!r}"
+        ) from None

@@ -54,9 +54,9 @@ def as_size(
     if isinstance(value, numbers.Integral):
         sides: tuple[Any, ...] = (value,) * axes
     else:
-        sides = as_tuple(value, name, axes, f"{order} as integers")
+        sides = as_tuple(value, name, axes, f"an integer or integers {order}")
     if not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
-        raise InvalidInput(f"{name}: must be {order} as integers, got {value!r}")
+        raise InvalidInput(f"{name}: must be an integer or integers {order}, got {value!r}")
     result = tuple(int(s) for s in sides)
     if min(result) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
@@ -144,8 +144,8 @@ def check_work(
 def as_instance(value: object, name: str, *kinds: type) -> Any:
     """Check that a value is an instance of one of the given classes, and return it."""
     if not isinstance(value, kinds):
-        needed = " or a ".join(kind.__name__ for kind in kinds)
-        raise InvalidInput(f"{name}: must be a {needed}, got {type(value).__name__}")
+        needed = " or ".join(kind.__name__ for kind in kinds)
+        raise InvalidInput(f"{name}: must be an instance of {needed}, got {type(value).__name__}")
     return value
 
 

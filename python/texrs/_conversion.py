@@ -102,8 +102,8 @@ def _take_whole(value: Any, name: str) -> Array:
     count = int(np.ma.getmaskarray(value).sum())
     if count:
         raise InvalidInput(
-            f"{name}: {count} of {value.size} values are masked; texrs.inpaint fills them by example, "
-            "or value.filled(...) with a number"
+            f"{name}: {count} of {value.size} values are masked; fill them with texrs.inpaint, or set them to a number "
+            "with the method filled(number)"
         )
     return np.asarray(value.data)
 
@@ -141,7 +141,8 @@ def report_nodata(path: str | os.PathLike[str], pixels: Array) -> None:
     if count:
         name = os.path.basename(path)
         ignore(
-            f"{name}: its nodata value {value:g} is not used, so {count} pixels count as data; texrs inpaint fills them"
+            f"{name}: its nodata value {value:g} is ignored, so {count} pixels with this value are used as data; "
+            "texrs inpaint can fill them"
         )
 
 

@@ -92,12 +92,12 @@ def flatten_lighting(
         as_choice(space, "space", ("srgb", "linear"))
     encoding = space or usual
     if pixels.dtype == np.bool_:
-        raise InvalidInput("image: must be colours as integers or floats, got bool")
+        raise InvalidInput("image: must contain integers or floats, got bool")
     clear = channels in (2, 4)
     colours = channels - clear
     seen = pixels[..., :colours]
     if pixels.dtype.kind == "f" and (brightest := max(float(seen.max()), -float(seen.min()))) > BRIGHTEST:
-        raise InvalidInput(f"image: colours must be at most {BRIGHTEST:g}, got {brightest:g}")
+        raise InvalidInput(f"image: values must be at most {BRIGHTEST:g} in magnitude, got {brightest:g}")
     gains = measure(pixels, colours, encoding, over, (cyclic[0], cyclic[1])) * np.float32(share)
     made = pixels.copy()
     if not gains.any():

@@ -162,7 +162,7 @@ def mark(value: object, name: str, shape: Sequence[int | str], wrap: Sequence[bo
     mask = as_marks(value)
     given = as_ndarray(mask.marks, name, axes=len(shape), used=False)
     if given.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: must be bool, integers or floats, got dtype {given.dtype}")
+        raise InvalidInput(f"{name}: must contain bool, integers or floats, got dtype {given.dtype}")
     sides = given.shape[: len(shape)]
     fits = len(sides) == len(shape) and all(
         n > 0 if isinstance(wanted, str) else n == wanted for n, wanted in zip(sides, shape, strict=True)
@@ -186,23 +186,27 @@ def _decide(given: Array, axes: int, mask: Mask, called: str) -> Bools:
     if levels.dtype == np.bool_ or not levels.size:
         return np.array(levels, np.bool_)
     if levels.min() < 0:
-        assume(f"{called}: read as numbers, because some are negative; each value other than 0 is marked")
+        assume(f"{called}: read as numbers, because some values are negative; all values other than 0 are marked")
         return np.asarray(levels != 0)
     top, white = float(levels.max()), _find_white(levels)
     if top < HALF * white:
         between = np.count_nonzero((levels > top / 4) & (levels < top * 3 / 4))
         cut = HALF * top if between <= TWO * np.count_nonzero(levels) else 0.0
         if top > 1 and (levels.dtype.kind == "f" or levels.dtype.itemsize < 4):
-            least = f"from {cut:g} on" if np.any((levels > 0) & (levels < cut)) else "other than 0"
+            least = f"of at least {cut:g}" if np.any((levels > 0) & (levels < cut)) else "other than 0"
             assume(
-                f"{called}: read as numbers, because the largest is {top:g} of {white:g}; each value {least} is marked"
+                f"{called}: read as numbers, because the largest value is {top:g}, and white would be {white:g}; "
+                f"values {least} are marked"
             )
         white = top
     else:
         cut = HALF * white
         grey = float(np.mean((levels > GREY * white) & (levels < cut)))
         if mask.threshold is None and grey >= LEAST_GREY:
-            assume(f"{called}: {100 * grey:.0f} % is less than half white or opaque, so not marked (see --threshold)")
+            assume(
+                f"{called}: {100 * grey:.0f} % of the pixels are dark grey or mostly transparent, so they are not "
+                "marked (see --threshold)"
+            )
     if mask.threshold is not None:
         cut = mask.threshold * white
     return np.asarray((levels >= cut) & (levels > 0))
@@ -214,7 +218,7 @@ def _look_through(levels: Array, alpha: Array, called: str) -> Array:
     seen = levels[alpha >= HALF * full].astype(np.float64) / white
     dark, light = (float(np.mean(part)) if seen.size else 0.0 for part in (seen < 0.25, seen > 0.75))
     if min(dark, light) >= LEAST_GREY and dark + light >= 1 - TWO:
-        assume(f"{called}: read as a mask in black and white with transparent parts, which are not marked")
+        assume(f"{called}: read as a black and white mask; its transparent parts are not marked")
         return np.where(alpha >= HALF * full, levels, 0).astype(levels.dtype)
     if (
         seen.size > MUCH * alpha.size

@@ -44,7 +44,7 @@ ENOUGH = 2**18
 CHUNK, MANY = 2**16, 2**12
 """Number of pixels whose colours are collected at once, and number of colours above which sorting all pixels is faster.
 """
-OFF = "--no-palette or another interpolation turns this off"
+OFF = "use --no-palette or another interpolation to change this"
 """End of each notice, which explains how to allow other colours."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
 """True: all images keep their colours. False: no image does. None: indexed images and images of few colours do."""
@@ -114,7 +114,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
     tables = [_list_colours(image) for _, image in images]
     for (name, _), origin, table in zip(images, known, tables, strict=True):
         what = name if origin is None else origin[0]
-        assume(f"{what}: {len(table)} colours, so pixels are copied from the nearest pixel and not corrected; {OFF}")
+        assume(f"{what}: has only {len(table)} colours, so pixels are neither interpolated nor corrected; {OFF}")
     return Palette([image for _, image in images], len(np.unique(np.concatenate(tables))))
 
 
@@ -149,8 +149,8 @@ def keeps_colours(image: Array) -> bool:
     kept = has_few_colours(image) if asked is None else asked
     if kept:
         assume(
-            "exemplar: few colours, so pixels are copied from the nearest pixel; "
-            "--no-palette or another interpolation turns this off"
+            "exemplar: has only a few colours, so pixels are not interpolated; "
+            "use --no-palette or another interpolation to change this"
         )
     return kept
 
@@ -167,7 +167,7 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:
         return made
-    assume(f"maps: few colours, so pixels are copied from the nearest pixel and not corrected; {OFF}")
+    assume(f"maps: have only a few colours, so pixels are neither interpolated nor corrected; {OFF}")
     return replace(made, source_map=make_plain(made.source_map))
 
 

@@ -191,6 +191,7 @@ def _check(several: list[object], names: list[str]) -> list[Material]:
     materials = [each for each in several if isinstance(each, Material)]
     if len(materials) < len(several):
         raise InvalidInput(
-            f"{', '.join(names)}: must all be materials, or none of them, got {len(materials)} of {len(several)}"
+            f"{', '.join(names)}: must either all be materials or all be images, got {len(materials)} materials of "
+            f"{len(several)}"
         )
     return materials

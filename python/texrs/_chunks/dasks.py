@@ -45,7 +45,8 @@ def make_dask(reader: Reader, shape: object, chunks: object, axes: int, name: st
     grid, channel = Grid.of(shape, chunks, axes), reader.maps[name]
     if len(grid) > MOST:
         raise InvalidInput(
-            f"chunks: must give at most {MOST} blocks, got {len(grid)} of {grid.chunks}; use larger chunks"
+            f"chunks: must divide the texture into at most {MOST} blocks, got {len(grid)} blocks of {grid.chunks}; "
+            "use larger chunks"
         )
     sides = tuple(
         tuple(min(c, n - start) for start in range(0, n, c)) for n, c in zip(grid.shape, grid.chunks, strict=True)

@@ -135,7 +135,9 @@ def check_suffix(path: Path, axes: int, channel: Channel, chunk: Sequence[int]) 
     suffix = find_suffix(place).lower()
     if suffix == RAW:
         if channel.dtype == np.float16:
-            raise FileError(f"{path}: the header of .raw has no name for float16; write .npy or .tif")
+            raise FileError(
+                f"{path}: .raw cannot store float16, because its header cannot describe this type; use .npy or .tif"
+            )
         return
     if suffix not in FORMATS:
         known = ", ".join([*sorted(s for s, f in FORMATS.items() if (f.images if axes == 2 else f.volumes)), RAW])

@@ -122,7 +122,7 @@ def _as_lattice(shape: object, count: int) -> tuple[int, ...]:
     axes = len(shape) if isinstance(shape, Sequence) else 1
     sides = as_sides(shape, "shape", max(axes, 1))
     if math.prod(sides) != count:
-        raise InvalidInput(f"shape: must have {count} entries, one for each item, got {sides}")
+        raise InvalidInput(f"shape: must have a product of {count}, the number of items, got {sides}")
     return sides
 
 
@@ -191,12 +191,13 @@ class _Item:
             whole = open_array(self.store, name)
         except (FileNotFoundError, KeyError):
             raise InvalidInput(
-                f"function: must return the same maps for all items; the first has no {name!r}"
+                f"function: must return the same maps for all items, but the first result lacks the map {name!r}"
             ) from None
         wanted = whole.shape[len(self.lattice) :]
         if array.shape != wanted or array.dtype != whole.dtype:
             raise InvalidInput(
-                f"function: must return {whole.dtype} {wanted} for all items, got {array.dtype} {array.shape}"
+                f"function: must return {whole.dtype} arrays of shape {wanted} for all items, "
+                f"got {array.dtype} of shape {array.shape}"
             )
         try:
             whole[tuple(map(int, np.unravel_index(number, self.lattice)))] = array

@@ -276,7 +276,7 @@ def check_spacing(path: Path, spacing: Sequence[float] | None, axes: int) -> Seq
         return None
     suffix = find_suffix(FilePath(path)).lower()
     if axes != 3:
-        raise InvalidInput("spacing: only volumes have a spacing; image formats do not store it")
+        raise InvalidInput("spacing: only available for volumes, because image formats do not store it")
     return as_spacing(spacing, ".nrrd" if suffix == RAW else suffix)
 
 

@@ -110,7 +110,7 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
                 group = zarr.open_group(name, mode="r+")
         if group.attrs.get(RECORD) != said:
             raise FileError(
-                f"{name}: contains other data, or was written with other options; overwrite=True replaces it"
+                f"{name}: contains other data, or was written with other options; pass overwrite=True to replace it"
             )
         return group
     except FileError:
@@ -129,7 +129,7 @@ def _open_if_there(name: str) -> Any:
             if not os.path.lexists(name) or (os.path.isdir(name) and not os.listdir(name)):
                 return None
         if time.monotonic() > end:
-            raise FileError(f"{name}: exists, and is not a Zarr store; overwrite=True replaces it")
+            raise FileError(f"{name}: exists, and is not a Zarr store; pass overwrite=True to replace it")
         time.sleep(BEGINNING / 10)
 
 

@@ -280,8 +280,8 @@ def _run_processes(
 def _lose(number: int, spare: bool) -> WorkerLost:
     """Return an error about a task that ended its workers, or raise it if ``spare`` is False."""
     error = WorkerLost(
-        f"task {number}: ended {TRIES} workers; there may be too little memory for all workers, or the "
-        "script that started them must do its work under: if __name__ == '__main__'"
+        f"task {number}: the worker process ended without a result {TRIES} times; there may be too little memory for "
+        "all workers, or the script lacks if __name__ == '__main__': before its work"
     )
     if not spare:
         raise error
@@ -297,7 +297,7 @@ def pack(work: Work) -> bytes:
             import cloudpickle
         except ImportError:
             raise InvalidInput(
-                f"function: cannot be sent to other processes ({error}); install cloudpickle, which may help"
+                f"function: cannot be sent to other processes ({error}); install cloudpickle, which can send more"
             ) from None
         return bytes(cloudpickle.dumps(work))
 

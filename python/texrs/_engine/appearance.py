@@ -156,7 +156,7 @@ class Appearance:
         """
         missing = {*_PARTS, "shape", "wrap", "radius", "channels"} - set(arrays)
         if missing:
-            raise InvalidInput(f"analysis: must have all arrays, but lacks {', '.join(sorted(missing))}")
+            raise InvalidInput(f"analysis: lacks the arrays {', '.join(sorted(missing))}")
         made = cls.__new__(cls)
         try:
             colours, features, basis = (
@@ -175,7 +175,7 @@ class Appearance:
                 int(arrays["spacing"]),
             )
         except (TypeError, ValueError, OverflowError) as error:
-            raise InvalidInput(f"analysis: must have arrays that fit each other ({error})") from None
+            raise InvalidInput(f"analysis: its arrays do not match each other ({error})") from None
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -364,4 +364,4 @@ class Appearance:
     def check(self, region: Region) -> None:
         """Raise an error if a region does not have as many axes as the exemplar."""
         if len(region.shape) != len(self.shape):
-            raise InvalidInput(f"region: must have the {len(self.shape)} axes of the exemplar, got {region.shape}")
+            raise InvalidInput(f"region: must have {len(self.shape)} axes like the exemplar, got shape {region.shape}")

@@ -94,7 +94,7 @@ def find_similar(
 
     """
     if as_int(n, "n", 1, 1 << 20) % 2 == 0:
-        raise InvalidInput(f"n: must be odd, the side of a box around a sample, got {n}")
+        raise InvalidInput(f"n: must be an odd number, because the box is centred on a sample, got {n}")
     count = as_int(k, "k", 1, 16)
     sets = _rust.similar(appearance._inner, count, n, _check_numbers(numbers), progress)
     return Similarity(sets.reshape(-1, count), numbers)

@@ -90,7 +90,7 @@ class Region:
         """Check that an array contains source coordinates for each point of a region."""
         count = self.points * len(self.shape)
         if places.dtype != np.int32 or places.shape != (count,):
-            raise InvalidInput(f"places: must be int32 of {count} numbers, got {places.dtype} {places.shape}")
+            raise InvalidInput(f"places: must be {count} numbers of int32, got {places.dtype} of shape {places.shape}")
 
 
 def flatten(mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:

@@ -239,7 +239,7 @@ class Stitcher:
         """
         axes = len(self.shape)
         if len(region.shape) != axes:
-            raise InvalidInput(f"region: must have the {axes} axes of the exemplar, got {region.shape}")
+            raise InvalidInput(f"region: must have {axes} axes like the exemplar, got shape {region.shape}")
         places, patches, jacobians, seams, healed = self._inner.stitch(
             region.place,
             frames,

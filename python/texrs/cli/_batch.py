@@ -173,7 +173,7 @@ def batch_command(
             note(f"wrote {recipe.sheet}", quiet=quiet)
     for job, reason in failed:
         complain(f"failed: {job.source} to {job.out}: {reason}")
-    done = f"{len(jobs) - len(failed)} of {len(jobs)} results are there"
+    done = f"{len(jobs) - len(failed)} of {len(jobs)} results are complete"
     parts = f", {partly} ignored parts of their inputs" if partly else ""
     note(f"{done}, {len(failed)} failed{parts}, in {time.monotonic() - start:.1f} s", quiet=quiet and not failed)
     if failed:
@@ -190,7 +190,8 @@ def make_context(command: Any, verb: str, words: list[str]) -> Any:
             raise
         name = missing.metavar or missing.name.upper()
         raise InvalidInput(
-            f"--argument: must give {name} of texrs {verb} for each input, as in --argument 'masks/{{name}}.png'"
+            f"--argument: must specify the argument {name} of texrs {verb} for each input, as in "
+            "--argument 'masks/{name}.png'"
         ) from None
 
 
@@ -210,7 +211,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
                 said, partly = one.said, partly + bool(one.ignored)
                 job, where = work.jobs[number], f"{number + 1} of {total}"
                 if said == THERE:
-                    note(f"{where}: {job.out} is there", quiet=quiet)
+                    note(f"{where}: {job.out} exists already", quiet=quiet)
                 elif said == MADE:
                     keep(job.out)
                     note(f"{where}: wrote {job.out}{one.show()}", quiet=quiet)
@@ -218,7 +219,7 @@ def run_jobs(work: Work, who: int | str | None, count: int | None, *, quiet: boo
                     failed[number] = said
                     note(f"{where}: {job.source} failed{one.show()}", quiet=quiet)
     except (Stopped, KeyboardInterrupt, typer.Abort):
-        complain(f"stopped after {over} of {total}; the same command continues from there")
+        complain(f"stopped after {over} of {total} results; the same command continues from there")
         raise
     return [(work.jobs[number], failed[number]) for number in sorted(failed)], partly
 

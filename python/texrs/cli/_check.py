@@ -65,10 +65,10 @@ def list_borders(found: Tiling) -> list[str]:
     lines = []
     for (axis, border), tiles, seam, place in zip(BORDERS.items(), found.tiles, found.seam, found.place, strict=True):
         if seam is None or place is None:
-            lines.append(f"{axis} ({border}): too few {axis} to tell")
+            lines.append(f"{axis} ({border}): too few {axis} for a test")
             continue
         other = "columns" if axis == "rows" else "rows"
-        where = "" if tiles else f", boldest at {other} {place[0]} to {place[1] - 1}"
+        where = "" if tiles else f", most visible at {other} {place[0]} to {place[1] - 1}"
         step = found.step[0 if axis == "rows" else 1]
         inside = "" if step is None else f"; seams inside {'visible' if step > SEEN else 'not visible'}, {step:.2f}"
         lines.append(f"{axis} ({border}): {'tile' if tiles else 'do not tile'}, seam {seam:.2f}{where}{inside}")

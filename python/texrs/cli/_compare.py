@@ -54,7 +54,7 @@ def compare_command(
     from texrs.comparison import compare
 
     if not out:
-        raise InvalidInput("--out: must be given")
+        raise InvalidInput("--out: is required")
     _outputs.check_suffix("out", out, ".html")
     _outputs.check_output(out)
     named = {}

@@ -74,7 +74,7 @@ def run(work: Callable[[], object]) -> int:
     code = _run(work)
     if code not in (DONE, PARTLY) and KEPT:
         names = ", ".join(KEPT[:8]) + (f" and {len(KEPT) - 8} more" if len(KEPT) > 8 else "")
-        complain(f"what was done is kept: {names}")
+        complain(f"files that were finished before are kept: {names}")
     return code
 
 
@@ -104,7 +104,7 @@ def _run(work: Callable[[], object]) -> int:
         complain(say_error(error))
         code = BAD_INPUT
     except MemoryError:
-        complain("this needs more memory than is available; a smaller size or exemplar needs less")
+        complain("the command needs more memory than is available; use a smaller size or exemplar")
         code = BAD_INPUT
     except OSError as error:
         name = f"{error.filename}: " if isinstance(error.filename, str) else ""
@@ -295,7 +295,7 @@ def _end_stopped(number: int) -> int:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     else:
-        complain("stopped; nothing was left half-written")
+        complain("stopped; no incomplete files are left")
     return 128 + number
 
 
@@ -311,10 +311,10 @@ def _describe_usage(failure: Exception) -> str:
     placed = [p.name.removesuffix("_marks") for p in parameters if p.param_type_name == "argument"]
     if context is not None and wrong is not None and wrong.lstrip("-").replace("-", "_") in placed:
         usage = " ".join(name.upper() for name in placed)
-        message = f"No such option: {wrong}; give its value by its place: {context.command_path} {usage}"
+        message = f"No such option: {wrong}; give its value without an option name: {context.command_path} {usage}"
     if EXTRA_PLACES.search(message):
         message += "; put places in quotes, as in '20,20 104,24 110,100 14,112'"
     command = context.command_path if context is not None else "texrs"
     # Inside a batch, the name of the command lacks the prefix texrs.
     command = command if command.startswith("texrs") else f"texrs {command}"
-    return f"{message.rstrip('.')} ({command} --help lists what is allowed)"
+    return f"{message.rstrip('.')} (see {command} --help)"

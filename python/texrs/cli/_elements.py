@@ -145,7 +145,7 @@ def database_command(
                 say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
         case "remove":
             if not names:
-                raise InvalidInput("NAME: must be the name of a texture to remove")
+                raise InvalidInput("NAME: requires at least one texture to remove, got none")
             for name in names:
                 textures.remove(name)
                 note(f"removed {name}", quiet=quiet)
@@ -168,7 +168,10 @@ def write_splices(
     if out is None:
         raise InvalidInput(f"--out: must be the name of an image file for {action}")
     if action == "splice" and len(names) != 2:
-        raise InvalidInput(f"NAME: must be two names for splice, of elements and of a layout; got {len(names)}")
+        raise InvalidInput(
+            "NAME: must be two names for splice: the texture with the elements, and the texture with the layout; "
+            f"got {len(names)}"
+        )
     records = {record.name: record for record in textures.list()}
     files = {name: os.path.join(textures.path, record.file) for name, record in records.items()}
     # Do not record names as input files, because they refer to textures in the folder.
@@ -222,10 +225,10 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
     images = [i for i in items if not re.fullmatch(PLACE, i)]
     values = ANALYSED.read(given)
     if not images:
-        raise InvalidInput("IMAGE: must be an image to add")
+        raise InvalidInput("IMAGE: requires at least one image to add, got none")
     if len(images) > 1 and (given["name"] or {("box",), ("background",), ("mask",), ("points",)} & values.keys()):
         raise InvalidInput(
-            "IMAGE: must be one image with --name, --box, --background, --mask or --points; add images one by one"
+            "IMAGE: must be a single image with --name, --box, --background, --mask or --points; add images one by one"
         )
     for image in images:
         _outputs.check_apart([image], {"name": os.path.join(folder, f"{given['name'] or Path(image).stem}.npz")})

@@ -61,7 +61,7 @@ def samples_command(
     for name in names or ():
         if name not in known:
             near = suggest(name, known) or f"; it must be one of {', '.join(known)}"
-            raise InvalidInput(f"NAME: must be a sample, got {name!r}{near}")
+            raise InvalidInput(f"NAME: must be the name of a sample, got {name!r}{near}")
     chosen = names or list(known)
     if out is None:
         for name in chosen:
@@ -82,7 +82,7 @@ def samples_command(
             options["size"] = parse_size(size, axes=3 if is_solid(name) else 2)
         if name not in samples.names():
             for option in options:
-                ignore(f"{name}: --{option} is not used, because it is a photograph")
+                ignore(f"{name}: --{option} is not used, because this sample is a photograph")
             options = {}
         with name_arguments():
             made[name] = samples.load(name, **options).image

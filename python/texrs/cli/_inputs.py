@@ -135,9 +135,7 @@ class _Found:
         taken = {*read, *(p for p in paths if os.path.basename(p).lower() in SYSTEM or p.lower().endswith(DOCUMENTS))}
         left = [p for p in paths if p not in taken]
         if left:
-            ignore(
-                f"{text}: {_count(left, 'file')} not used, because the suffix is not that of a format: {_list(left)}"
-            )
+            ignore(f"{text}: {_count(left, 'file')} not used, because texrs does not read this suffix: {_list(left)}")
         for path in read:
             self.files.setdefault(path, base)
 
@@ -225,7 +223,8 @@ def join_braces(paths: Sequence[str]) -> str:
     text = f"{start}{{{','.join(r[: len(r) - len(end)] for r in rest)}}}{end}"
     if sorted(expand_braces(text)) != sorted(paths):
         raise InvalidInput(
-            f"inputs: {paths[0]} and {len(paths) - 1} more are maps of one material; put them in a folder"
+            f"inputs: {paths[0]} and {len(paths) - 1} more files are maps of one material; put them in a folder of "
+            "their own"
         )
     return text
 

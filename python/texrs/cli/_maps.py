@@ -62,7 +62,7 @@ def apply_command(
     values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
     if given["finish_screening"] and places.axes != 2:
-        raise InvalidInput("--screening: not available, because the source map is of a volume")
+        raise InvalidInput("--screening: only available for source maps of images, not of volumes")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
@@ -107,8 +107,8 @@ def store_map(
     """Write a result to a store, chunk by chunk, so that it does not have to fit in memory."""
     if finish.screening is not None or finish.light is not None or finish.fade is not None:
         raise InvalidInput(
-            f"--out: {out} is written in parts, but seams can only be blended in the whole result; pass --screening "
-            "0, or write to a file"
+            f"--out: {out} is written in parts, where colours cannot be corrected; write to another format, or for "
+            "seams pass --screening 0"
         )
     read = io.read if places.axes == 2 else io.read_volume
     images = [read(path) for path in paths]
@@ -177,7 +177,7 @@ def group(maps: Sequence[str], count: int) -> list[list[str]]:
     """Return the maps in groups, each with one map for each exemplar of the source map."""
     if len(maps) % count:
         raise InvalidInput(
-            f"IMAGE: must be {count} images for each result, one for each exemplar of the source map; got {len(maps)}"
+            f"IMAGE: each result needs {count} images, one for each exemplar of the source map; got {len(maps)}"
         )
     return [list(maps[i : i + count]) for i in range(0, len(maps), count)]
 
@@ -192,7 +192,7 @@ def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str
     for i, target in enumerate(targets):
         _outputs.check_apart(inputs, {"out": target})
         if target in targets[:i]:
-            raise InvalidInput(f"--out: two maps have the name {Path(target).name}; write them one by one")
+            raise InvalidInput(f"--out: two results would have the name {Path(target).name}; write them one by one")
     return targets
 
 

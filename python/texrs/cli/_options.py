@@ -246,7 +246,9 @@ class Options:
         if kind is None and named is not None and (named.plain or type_ is None):
             kind = named
         if kind is None and type_ is None:
-            raise TypeError(f"{self.function.__name__}: nothing says how {'.'.join(path)} is read")
+            raise TypeError(
+                f"{self.function.__name__}: the parameter {'.'.join(path)} has neither a known type nor a kind"
+            )
         return kind, type_ if kind is None else list[str] if kind.many else str
 
 

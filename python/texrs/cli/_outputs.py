@@ -156,8 +156,8 @@ def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> No
     for name, value in outputs.items():
         if isinstance(value, str) and os.path.realpath(value) in read:
             raise InvalidInput(
-                f"{as_flag(name)}: {value} is an input, and would contain other maps afterwards; write to another "
-                "folder"
+                f"{as_flag(name)}: {value} is the folder of an input, and would contain other maps afterwards; "
+                "write to another folder"
             )
 
 
@@ -184,7 +184,7 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
         if path is not None:
             other = seen.setdefault(os.path.realpath(path), option)
             if other != option:
-                raise InvalidInput(f"{as_flag(option)}: {path} is already the file of {as_flag(other)}")
+                raise InvalidInput(f"{as_flag(option)}: {path} is already the output of {as_flag(other)}")
     if (source := paths.get("source_map")) is not None:
         check_suffix("source_map", source)
         check_output(source, option="source_map")
@@ -423,15 +423,13 @@ def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[f
     if stated is None or not holds_spacing(image, suffix):
         if stated is not None and any(step != 1 for step in stated):
             ignore(
-                f"{volume or '--spacing'}: the spacing is not kept, because {suffix} of {image.dtype} cannot state it"
+                f"{volume or '--spacing'}: the spacing is not kept, because {suffix} of {image.dtype} cannot store it"
             )
         io.write_volume(path, image)
         return
     kind = "" if volume is None else detect_kind(Path(volume))
     if kind in PLACING and not suffix[1:].startswith(kind[:3]):
-        ignore(
-            f"{volume}: its orientation, origin and unit are not kept, because only files of its format take them over"
-        )
+        ignore(f"{volume}: its orientation, origin and unit are not kept, because only the same format can take them")
     io.write_volume(path, image, spacing=stated, like=volume)
 
 
@@ -451,7 +449,9 @@ def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     """Return the output names for one of several results. The seed is added to each name."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
-            raise InvalidInput(f"{as_flag(option)}: must be a name that a seed can be added to, got {path!r}")
+            raise InvalidInput(
+                f"{as_flag(option)}: must contain a file name, because a seed is added to it, got {path!r}"
+            )
     named: dict[str, str | None] = {}
     for option, path in paths.items():
         suffix = "" if path is None else find_suffix(Path(path))

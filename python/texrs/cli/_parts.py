@@ -50,7 +50,7 @@ OPTIONS: dict[str, tuple[Any, str, str]] = {
 """Options for writing a part of an unbounded texture: type, form and description of each."""
 TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "spacing", "memory_limit")
 """Parameters that unbounded textures have in common with the commands."""
-BEYOND = "to OUT.zarr, or with --chunks, it is made in parts"
+BEYOND = "write to OUT.zarr, or pass --chunks, to compute the result in parts"
 """Remedy in errors about results that do not fit in memory."""
 PAUSE = 5.0
 """Minimum time between two updates of the remaining time, in seconds."""
@@ -180,7 +180,7 @@ def write_part(
             )
         else:
             done = write_file(whole, out, grid, asked, spacing, count, watch)
-    there = f"{done.chunks} chunks, of which {done.chunks - done.made} were there"
+    there = f"{done.chunks} chunks, of which {done.chunks - done.made} existed already"
     note(f"wrote {out}: {_outputs.show_sides(sides)}, {there}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
@@ -228,7 +228,7 @@ class _Forecast:
 
 
 def _list(said: Mapping[str, Any]) -> str:
-    return ", ".join(f"--{name}" for name, value in said.items() if value is not None) or "a .zarr"
+    return ", ".join(f"--{name}" for name, value in said.items() if value is not None) or "a .zarr file"
 
 
 def _parse_origin(text: str | None, axes: int) -> tuple[int, ...]:

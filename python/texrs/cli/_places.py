@@ -95,7 +95,7 @@ def parse_corners(text: str, about: About) -> list[list[float]]:
     points = parse_places([text], about)
     if len(points) != 4:
         raise InvalidInput(
-            f"{about.option}: must be four places X,Y, as in '20,20 104,24 110,100 14,112', got {text!r}"
+            f"{about.option}: must be four points X,Y, as in '20,20 104,24 110,100 14,112', got {text!r}"
         )
     return points
 
@@ -177,9 +177,11 @@ def check_corners(corners: Sequence[Sequence[float]], size: Sequence[int]) -> No
     reason = _find_fault(points, size)
     if reason:
         other = (
-            "" if _find_fault(points[:, ::-1], size) else "; they fit as row,column, but x comes first: exchange them"
+            ""
+            if _find_fault(points[:, ::-1], size)
+            else "; they would fit as row,column: exchange the numbers of each corner"
         )
-        raise InvalidInput(f"corners: {reason}; read as the x,y {said} in an image of {size[1]} x {size[0]}{other}")
+        raise InvalidInput(f"corners: {reason}; as x,y, they are {said} in an image of {size[1]} x {size[0]}{other}")
 
 
 def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
@@ -187,10 +189,10 @@ def _find_fault(points: np.ndarray, size: Sequence[int]) -> str:
     # Corners are placed by hand, so allow one pixel beyond the border.
     outside = ((points < -1) | (points > np.asarray(size[:2]))).any(axis=1)
     if outside.any():
-        return f"{outside.sum()} of the four leave the image"
+        return f"{outside.sum()} of the four are outside the image"
     sides = np.roll(points, -1, axis=0) - points
     after = np.roll(sides, -1, axis=0)
     turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
     if np.all(turns > 0) or np.all(turns < 0):
         return ""
-    return "the sides cross, or the shape is not convex: give the corners in order around it"
+    return "the sides cross, or the shape is not convex: give the corners in their order around the shape"

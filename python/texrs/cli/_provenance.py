@@ -324,5 +324,5 @@ def _find_other(running: Record, path: str) -> str:
     if said.get("verb") != running.verb:
         return f"was made by texrs {said.get('verb')}"
     if said.get("arguments") != running.rename(running.arguments, folder):
-        return f"was made from {' '.join(str(a) for a in said.get('arguments', ()) if a is not None)}"
+        return f"was made with other arguments: {' '.join(str(a) for a in said.get('arguments', ()) if a is not None)}"
     return ""

@@ -125,10 +125,10 @@ def fit_volume(given: Array, path: str, about: About) -> Array:
                 show_extent(each)
                 for each in (zip(given.shape, stated, strict=False), zip(about.size, about.spacing, strict=True))
             ]
-            raise InvalidInput(f"{path}: must span {spans[1]} as the result does, got {spans[0]}")
+            raise InvalidInput(f"{path}: must have the extent of the result, {spans[1]}, got {spans[0]}")
         at = np.minimum(((np.arange(side) + 0.5) * mine / theirs).astype(np.intp), given.shape[axis] - 1)
         given = given.take(at, axis=axis)
-    assume(f"{path}: resampled by its spacing, because its voxels have another size than those of the result")
+    assume(f"{path}: resampled by its spacing, because its voxels and the voxels of the result differ in size")
     return given
 
 
@@ -165,7 +165,7 @@ def read_mask(path: str, axes: int = 2) -> Array:
     marked = mark(mask, path, ("planes", "rows", "columns")[3 - axes :])
     if not marked.any():
         raise InvalidInput(f"{path}: marks nothing; marked pixels of a mask must be white")
-    assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of it")
+    assume(f"{os.path.basename(path)}: read as a mask that marks {100 * float(marked.mean()):.3g} % of the image")
     return marked
 
 
@@ -198,7 +198,7 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
     values, kind = io.read(path), parse_kind(io.read_description(path))
     if values.dtype.kind == "f":
         if values.ndim == 3 and (values != values[..., :1]).any():
-            ignore(f"{path}: only the first of {values.shape[2]} channels is used: a scale map has one")
+            ignore(f"{path}: only the first of {values.shape[2]} channels is used, because a scale map has one channel")
         scale = np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
     else:
         levels: Any = encoding
@@ -228,7 +228,7 @@ def read_target(text: str) -> Any:
         return read_scale_map(text)
     assume(f"{text}: read as normals of a surface")
     if values.shape[2] > 3:
-        ignore(f"{text}: {values.shape[2] - 3} of {values.shape[2]} channels not used: normals have three")
+        ignore(f"{text}: {values.shape[2] - 3} of {values.shape[2]} channels not used, because normals have three")
     return values[..., :3]
 
 

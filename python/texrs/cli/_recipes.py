@@ -96,17 +96,17 @@ def check_recipe(said: Mapping[str, Any], where: str) -> Recipe:
         ("out", str, "a folder, or a name such as made/{name}-{seed}.png"),
         ("sheet", str, "the name of a file"),
         ("options", dict, "a table"),
-        ("presets", dict, "tables of options, by name"),
+        ("presets", dict, "a table of presets"),
     ):
         if key in said and not (isinstance(said[key], kind) and said[key]) and said[key] != {}:
             raise InvalidInput(f"{where}: {key} must be {wanted}, got {said[key]!r}")
     for key in ("verb", "inputs", "out"):
         if key not in said or not said[key]:
             option = {"out": "--out", "inputs": "INPUT"}.get(key, key) if not where.endswith(".toml") else key
-            raise InvalidInput(f"{where}: must contain {option}")
+            raise InvalidInput(f"{where}: {option} is missing")
     presets = said.get("presets", {})
     if not all(isinstance(value, dict) for value in presets.values()):
-        raise InvalidInput(f"{where}: presets must be tables of options, by name, got {presets!r}")
+        raise InvalidInput(f"{where}: each preset must be a table of options, got {presets!r}")
     return Recipe(
         said["verb"],
         as_texts(said["inputs"], f"{where}: inputs"),
@@ -128,7 +128,7 @@ def as_texts(value: Any, where: str) -> list[str]:
     """Return one or several texts as a list."""
     several = [value] if isinstance(value, str) else value
     if not isinstance(several, list) or not all(isinstance(v, str) for v in several):
-        raise InvalidInput(f"{where}: must be a text or a list of texts, got {value!r}")
+        raise InvalidInput(f"{where}: must be a string or a list of strings, got {value!r}")
     return several
 
 
@@ -187,12 +187,12 @@ def list_jobs(recipe: Recipe, parameters: Sequence[Any]) -> Iterator[Job]:
             other = taken.setdefault(os.path.realpath(job.out), source)
             if other != source or len({os.path.realpath(j.out) for j in jobs}) < len(jobs):
                 raise InvalidInput(
-                    f"out: must differ for each result, but several have the name {job.out}; use {{folder}}, "
-                    f"{{name}}, {{suffix}}, {{parent}}, {{preset}} or {{seed}}"
+                    f"out: must differ for each result, but several have the name {job.out}; add {{folder}}, "
+                    f"{{name}}, {{suffix}}, {{parent}}, {{preset}} or {{seed}} to it"
                 )
             total += 1
             if total > MOST:
-                raise InvalidInput(f"inputs, seeds: must give at most {MOST} results")
+                raise InvalidInput(f"inputs, seeds: must result in at most {MOST} files")
             yield job
 
 
@@ -227,7 +227,7 @@ def check_files(jobs: Sequence[tuple[Job, Any]], parameters: Sequence[Any]) -> N
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
         count = len({source for source, _ in missing})
         total = len({job.source for job, _ in jobs})
-        raise InvalidInput(f"arguments: {count} of {total} inputs lack a file: {names}{more}")
+        raise InvalidInput(f"arguments: files are missing for {count} of {total} inputs: {names}{more}")
 
 
 def place_arguments(recipe: Recipe, parameters: Sequence[Any]) -> Recipe:
@@ -289,5 +289,5 @@ def write_option(key: str, value: Any, known: Mapping[str, str]) -> list[str]:
         return [f"--{'' if value else 'no-'}{flag}"]
     several = value if isinstance(value, list) else [value]
     if not all(isinstance(v, str | int | float) for v in several):
-        raise InvalidInput(f"options: {key} must be a text, a number, true or false, got {value!r}")
+        raise InvalidInput(f"options: {key} must be a string, a number, true or false, got {value!r}")
     return [word for v in several for word in (f"--{flag}", fill(str(v), known))]

@@ -83,9 +83,9 @@ class Recipe:
                 said.get("places") != "x,y",
             )
         except (KeyError, TypeError, AttributeError, ValueError):
-            raise FileError(f"{path}: its record of the command is damaged") from None
+            raise FileError(f"{path}: the record of its command is damaged") from None
         if one.file is not None and os.path.basename(str(one.file)) != one.file:
-            raise FileError(f"{path}: its record of the command is damaged")
+            raise FileError(f"{path}: the record of its command is damaged")
         return one
 
     def make_command(self, names: Mapping[str, str], folder: str) -> list[str]:
@@ -131,7 +131,7 @@ class Recipe:
                 found[name] = same
             elif there:
                 now = hash_file(there[0])[:SHORT]
-                wrong.append(f"{name} has changed since (SHA-256 {sha[:SHORT]}... then, {now}... in {there[0]})")
+                wrong.append(f"{name} has changed since (SHA-256 {sha[:SHORT]}... then, {now}... now in {there[0]})")
             else:
                 wrong.append(f"{name} is missing (SHA-256 {sha[:SHORT]}...)")
         if wrong:
@@ -169,7 +169,7 @@ def rerun_command(
         check_same(out, recipe)
     command = context.find_root().command.get_command(context, recipe.verb)  # type: ignore[attr-defined]
     if command is None:
-        raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not have")
+        raise InvalidInput(f"{output}: was made by the command texrs {recipe.verb}, which this version lacks")
     # Repeat the command in a temporary folder.
     names = recipe.find_inputs()
     beside = os.path.dirname(os.path.dirname(os.path.realpath(recipe.path))) if None in recipe.arguments else None
@@ -201,14 +201,16 @@ def read_recipes(output: str) -> list[Recipe]:
         recipe = Recipe.read(output)
         if recipe is None:
             there = os.path.exists(output)
-            raise InvalidInput(f"{output}: has no record of how it was made" if there else f"{output}: does not exist")
+            raise InvalidInput(
+                f"{output}: has no record of the command that made it" if there else f"{output}: does not exist"
+            )
         return [recipe]
     inside = {entry.path for entry in os.scandir(output) if entry.is_file()}
     # Ignore a file that only contains the record of another file.
     files = sorted(file for file in inside if not (file.endswith(".json") and file.removesuffix(".json") in inside))
     known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
     if not known:
-        raise InvalidInput(f"{output}: none of its files has a record of how it was made")
+        raise InvalidInput(f"{output}: contains no file with a record of the command that made it")
     if len({(each.show(), each.output, tuple(each.inputs.items())) for each in known}) > 1:
         raise InvalidInput(f"{output}: contains results of several commands; name one of its files")
     return known
@@ -233,7 +235,9 @@ def compare(recipe: Recipe, made: str) -> None:
         say(f"{recipe.path}: was changed since it was made; its inputs still give the original file, SHA-256 {now}")
         return
     why = f"; it was made by texrs {recipe.version}, this is {__version__}" if recipe.version != __version__ else ""
-    raise InvalidInput(f"{recipe.path}: its inputs now give another file (SHA-256 {now}, this file has {then}){why}")
+    raise InvalidInput(
+        f"{recipe.path}: its inputs now give a different file (SHA-256 {now}, but {then} for this file){why}"
+    )
 
 
 # --- what a file holds -----------------------------------------------------------------------------------------------

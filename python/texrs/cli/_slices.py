@@ -45,7 +45,7 @@ def parse_at(text: str, about: About) -> tuple[int, int] | list[float]:
     except ValueError:
         pass
     raise InvalidInput(
-        f"{about.option}: must be x=, y= or z= and a number, or three numbers such as 10,20,30; got {text!r}"
+        f"{about.option}: must be a slice such as z=30 (x, y or z), or a point such as 10,20,30; got {text!r}"
     )
 
 
@@ -142,7 +142,9 @@ def slice_command(
     check_needed(given, owners, (chosen or ["--at"])[0])
     paged = Path(out).suffix.lower() in (".html", ".htm")
     if paged and chosen:
-        raise InvalidInput(f"--out: must be an image with {chosen[0]}, got {out!r}; a page shows slices along all axes")
+        raise InvalidInput(
+            f"--out: must be an image with {chosen[0]}, got {out!r}; an HTML page shows only slices along the axes"
+        )
     with name_arguments(point="--oblique", normal="--oblique", count="--threads"), threads(count):
         check_view(used, options)
     with name_arguments():

@@ -107,7 +107,7 @@ class Stack:
         if convention is not None:
             as_convention(convention, "--convention")
             if pack is not None:
-                raise InvalidInput("--pack: cannot be combined with --convention, which has its own packings")
+                raise InvalidInput("--pack: cannot be combined with --convention, which specifies the packing")
         return cls(said, depth, None if suffix is None else f".{suffix}", pack, convention)
 
     def list_writing(self) -> dict[str, object]:

@@ -59,7 +59,7 @@ def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[boo
         wanted = (
             "must be one of default, xy, x, y, none"
             if axes == 2
-            else "must be letters of x, y and z, each once, or none, or default"
+            else "must be default, none, or some of the letters x, y and z, each once"
         )
         raise InvalidInput(f"{option}: {wanted}; got {text!r}")
     return tuple(letters != "none" and letter in letters for letter in known)
@@ -152,5 +152,5 @@ def read_json(text: str, option: str) -> Any:
 def read_corrections(text: str, about: About) -> Any:
     """Read a list of corrections from JSON text or a JSON file."""
     if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
-        raise InvalidInput(f"{about.option}: must be a file of JSON, or a list of steps as JSON; got {text!r}")
+        raise InvalidInput(f"{about.option}: must be a .json file, or a list of corrections as JSON; got {text!r}")
     return read_steps(text, about)

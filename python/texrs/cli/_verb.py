@@ -217,7 +217,7 @@ class Verb:
         notes = io.read_metadata(name) if os.path.isfile(name) else io.Metadata()
         kept = self.fills or self.keeps
         if kept and notes.georeference and Path(out).suffix.lower() not in (".tif", ".tiff"):
-            ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF holds it")
+            ignore(f"{os.path.basename(name)}: its georeference is not written, because only TIFF files store it")
         notes = notes if kept else replace(notes, georeference=())
         role = guess_role(Path(name).stem)
         if role is not None and not role.coloured:

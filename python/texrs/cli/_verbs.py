@@ -181,7 +181,7 @@ def tell_sizes(result: Synthesis) -> str:
     found = result.report["measured"]
     if found is None:
         return ""
-    where = {"curved": "on a curved surface", "free": "place by place", "even": "nowhere"}.get(
+    where = {"curved": "on a curved surface", "free": "place by place", "even": "as equal everywhere"}.get(
         found["shape"], "on a plane"
     )
     if found["plane"] is not None:
@@ -227,7 +227,7 @@ def say_planes(result: Synthesis) -> str:
     for each in result.report.get("planes", [result.report]):
         plane = each["plane"]
         if plane is None:
-            said.append(", no plane followed")
+            said.append(", without perspective")
             continue
         sure = plane["confidence"] or 0.0
         found = f", found with confidence {sure:.2f}" if each["found"] else ""
@@ -253,8 +253,8 @@ def make_views(
     several |= {"fov": several["fov"] * count} if len(several.get("fov", [])) == 1 else {}
     for name, values in several.items():
         if len(values) != count:
-            many = f"one for each of {count} grounds, in their order, or 'found'" if count > 1 else "given once"
-            raise InvalidInput(f"{name}: must be {many}, got {len(values)} values")
+            many = f"given for each of {count} planes, in the order of --ground" if count > 1 else "given once"
+            raise InvalidInput(f"{name}: must be {many}; got {len(values)} values")
     fields: list[dict[str, Any]] = [{name: values[k] for name, values in several.items()} for k in range(count)]
     views = [PlaneView(**each) for each in fields]
     return views if count > 1 else views[0]

@@ -52,7 +52,7 @@ class Folder:
     def __init__(self, path: FilePath, log: Callable[[str], object] | None) -> None:
         self.path, self._say, self._made = path, log, False
         if not path.is_dir() and (path.exists() or not path.parent.is_dir()):
-            raise FileError(f"{path}: a folder cannot be created there")
+            raise FileError(f"{path}: must be a folder, or a new name in an existing folder")
 
     def keep(
         self,
@@ -108,7 +108,7 @@ class Folder:
                 found = self._parse()
                 if found is None:
                     found = self._scan()
-                    self.warn(f"{self.path / MANIFEST}: damaged; rebuilt from {len(found)} entries")
+                    self.warn(f"{self.path / MANIFEST}: was damaged, so it was rebuilt from {len(found)} entries")
                     self._write(found)
         return found
 
@@ -125,7 +125,7 @@ class Folder:
             version = int(table.get("version", 1))
             if version != VERSION:
                 raise FileError(
-                    f"{self.path / MANIFEST}: has version {version}, this texrs reads version {VERSION}; "
+                    f"{self.path / MANIFEST}: has version {version}, but this texrs reads version {VERSION}; "
                     "add the textures to a new folder"
                 )
             return {name: _read_record(name, item) for name, item in table["textures"].items()}
@@ -158,7 +158,7 @@ class Folder:
         try:
             while not (_lock_file(number) and self._is_lock(number)):
                 if time.monotonic() > end:
-                    raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
+                    raise FileError(f"{self.path}: another process has locked this folder for {PATIENCE:g} s")
                 time.sleep(PAUSE)
                 if not self._is_lock(number):
                     # The process that held the lock has removed its empty folder, so create the folder again.
@@ -205,7 +205,7 @@ class Folder:
 def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
     """Raise an error if another image is already stored under a name."""
     if name in found and found[name].hash != hash:
-        raise InvalidInput(f"name: {name} exists already, with another image; use replace=True to replace it")
+        raise InvalidInput(f"name: {name} exists already with another image; pass replace=True to replace it")
 
 
 def _lock_file(number: int) -> bool:

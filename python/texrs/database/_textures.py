@@ -226,7 +226,7 @@ class TextureDatabase:
                     f"image: its file name must consist of letters, digits, '.', '_' and '-', got {name!r}; pass a name"
                 )
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise InvalidInput(f"name: must be up to 100 letters, digits, '.', '_' and '-', got {name!r}")
+            raise InvalidInput(f"name: must consist of 1 to 100 letters, digits, '.', '_' and '-', got {name!r}")
         # Reject a taken name before the analysis, which is slow.
         pixels = as_image(image) if file is None else io.read(file)
         if not as_bool(replace, "replace"):
@@ -332,7 +332,7 @@ class TextureDatabase:
             return entry
         if entry is not None and hash_image(image) == hash_image(entry.image):
             return entry
-        self._folder.warn(f"{name}: analysed again, because the entry {reason or 'is of another image'}")
+        self._folder.warn(f"{name}: analysed again, because its entry {reason or 'belongs to another image'}")
         options = {k: restore_option(v) for k, v in record.options.items()}
         similar = bool(options.pop("similarity", False))
         entry = analyse(image, progress=progress, **options)
@@ -506,7 +506,7 @@ class TextureDatabase:
             self._find_record(name)
             chosen.append(name)
         if not chosen:
-            raise InvalidInput(f"{which}: must be at least one name, got none")
+            raise InvalidInput(f"{which}: must contain at least one name, got none")
         return tuple(chosen)
 
     def _read_entry(self, kept: Cache[str, ElementAnalysis], name: str) -> ElementAnalysis:

@@ -218,7 +218,7 @@ class Exemplar:
         _check_sides(self.shape, "exemplar", COARSEST)
         near = tuple(as_int(r, "radii", 1, 8) for r in as_items(radii, "radii"))
         if not near:
-            raise InvalidInput("radii: must contain at least one radius")
+            raise InvalidInput("radii: must contain at least one radius, got none")
         least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
         count = count_levels(self.shape, least)
         return self.cached(
@@ -478,7 +478,9 @@ class Exemplar:
         arrays = read_arrays(path, choose=choose)
         try:
             if int(arrays.get("format", np.array(-1)).reshape(())) != FORMAT:
-                raise FileError(f"{path}: is not an exemplar of this version of texrs")
+                raise FileError(
+                    f"{path}: was saved by another version of texrs; save the exemplar again with this version"
+                )
             axes, labels, *repeat = (int(s) for s in arrays["said"])
             made = cls(
                 arrays["image"],
@@ -488,7 +490,7 @@ class Exemplar:
             )
             analysis = Analysis.from_arrays(arrays)
             if analysis.shape != made.shape:
-                raise InvalidInput(f"the analysis has shape {analysis.shape}, the image {made.shape}")
+                raise InvalidInput(f"the analysis has shape {analysis.shape}, but the image has shape {made.shape}")
         except FileError:
             raise
         except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:

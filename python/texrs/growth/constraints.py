@@ -80,7 +80,7 @@ class Constraints:
         """Raise an error unless exactly one of values and coordinates is given."""
         if (self.values is None) == (self.coordinates is None):
             raise InvalidInput(
-                "constraints: must have either values or coordinates of the points that mask marks, not both"
+                "constraints: must have either values or coordinates for the points of mask, but not both"
             )
 
 
@@ -133,7 +133,8 @@ class Guide:
             check_memory(values.size, "guide")
             if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
                 raise InvalidInput(
-                    f"guide: the map of the {name} must be finite numbers, got {values.dtype} {values.shape}"
+                    f"guide: the map of the {name} must contain finite numbers, "
+                    f"got {values.dtype} of shape {values.shape}"
                 )
 
 
@@ -284,7 +285,7 @@ class Conditions:
         if guide is not None:
             if values is not None and pins is None:
                 raise InvalidInput(
-                    "guide: cannot be combined with values of constraints; give coordinates, or omit one of them"
+                    "guide: cannot be combined with constraints that have values; give coordinates instead"
                 )
             maps = _check_maps(guide, image.shape[: len(shape)], shape)
         return cls(image, mask, values, pins, maps, 0 if guide is None else round(FOLLOW * guide.weight))
@@ -344,10 +345,12 @@ def _check_coordinates(given: Array, mask: Bools, image: Array) -> Floats:
     axes = mask.ndim
     places, wanted = np.asarray(given), (*mask.shape, axes)
     if places.dtype.kind not in "iuf" or places.shape != wanted:
-        raise InvalidInput(f"coordinates: must be numbers of shape {wanted}, got {places.dtype} {places.shape}")
+        raise InvalidInput(
+            f"coordinates: must be numbers of shape {wanted}, got {places.dtype} of shape {places.shape}"
+        )
     inside = (places >= 0) & (places <= np.array(image.shape[:axes]) - 1)
     if not inside[mask].all():
-        raise InvalidInput("coordinates: must be finite and inside the exemplar at the given points")
+        raise InvalidInput("coordinates: must be finite and inside the exemplar at the points of mask")
     return np.where(mask[..., np.newaxis], places, 0).astype(np.float32)
 
 
@@ -355,11 +358,12 @@ def _check_values(given: object, mask: Bools, image: Array) -> Array:
     values, wanted = np.asarray(given), (*mask.shape, image.shape[-1])
     if values.dtype != image.dtype or values.shape not in (wanted, wanted[:-1] if wanted[-1] == 1 else wanted):
         raise InvalidInput(
-            f"values: must be {image.dtype} of shape {wanted}, like the exemplar, got {values.dtype} {values.shape}"
+            f"values: must be {image.dtype} (the dtype of the exemplar) of shape {wanted}, got {values.dtype} of shape "
+            f"{values.shape}"
         )
     values = values.reshape(wanted)
     if values.dtype.kind == "f" and not np.isfinite(values[mask]).all():
-        raise InvalidInput("values: must be finite at the given points")
+        raise InvalidInput("values: must be finite at the points of mask")
     return np.where(mask[..., np.newaxis], values, np.zeros((), values.dtype))
 
 
@@ -370,7 +374,8 @@ def _check_maps(guide: Guide, mine: tuple[int, ...], theirs: tuple[int, ...]) ->
             maps.append(np.broadcast_to(np.asarray(given), shape).astype(np.float64))
         except ValueError:
             raise InvalidInput(
-                f"guide: the map of the {name} must be finite numbers that broadcast to {shape}, got {np.shape(given)}"
+                f"guide: the map of the {name} must contain numbers and broadcast to shape {shape}, got shape "
+                f"{np.shape(given)}"
             ) from None
     low, span = maps[0].min(), float(np.ptp(maps[0])) or 1.0
     first, second = (np.asarray(np.clip((m - low) / span, 0, 1)[..., np.newaxis], np.float32) for m in maps)

@@ -358,7 +358,7 @@ def write(
 
     """
     if description is not None and not (isinstance(description, str) and description.isascii()):
-        raise InvalidInput(f"description: must be ASCII, got {description!r}")
+        raise InvalidInput(f"description: must be an ASCII string, got {description!r}")
     said = Metadata(multiplied=None) if notes is None else as_instance(notes, "notes", Metadata)
     array = _alpha.adapt(array, _files.as_path(path), said.multiplied)
     _write(path, array, 2, overwrite, None, description, said.georeference)
@@ -499,13 +499,13 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         raise FileError(f"{target}: the suffix must be .stl for surfaces, got {target.suffix!r}")
     corners, triangles = try_array(vertices), try_array(faces)
     if corners.ndim != 2 or corners.shape[-1] != 3 or corners.dtype.kind not in "uif":
-        raise InvalidInput(f"vertices: must be numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
+        raise InvalidInput(f"vertices: must be numbers of shape (N, 3), got {corners.dtype} of shape {corners.shape}")
     if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":
-        raise InvalidInput(f"faces: must be integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
+        raise InvalidInput(f"faces: must be integers of shape (M, 3), got {triangles.dtype} of shape {triangles.shape}")
     if not np.isfinite(corners).all() or not 0 < len(triangles) < 2**32:
-        raise InvalidInput("vertices, faces: must be finite vertices and at least one triangle")
+        raise InvalidInput("vertices, faces: vertices must be finite, and faces must contain at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
-        raise InvalidInput(f"faces: must be indices of vertices from 0 to {len(corners) - 1}")
+        raise InvalidInput(f"faces: must contain indices of vertices from 0 to {len(corners) - 1}")
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
@@ -552,8 +552,8 @@ def _write(
                     _tiff.write_imagej(temporary, planes, steps, read_unit(like))
                 else:
                     raise InvalidInput(
-                        "spacing: must be omitted in .tif, except for uint8, uint16 and float32, and for uint8 with "
-                        f"3 channels; got {array.dtype} with {channels} channels"
+                        "spacing: .tif can store it only for uint8, uint16 and float32 with one channel, and for "
+                        f"uint8 with 3 channels; got {array.dtype} with {channels} channels"
                     )
             case ".nrrd":
                 _volumes.write_nrrd(temporary, flat, steps, _find_header(like, "nrrd"))

@@ -23,7 +23,7 @@ MAPS, MADE = "texrs", "texrsMade"
 PICTURES = (("R", "G", "B", "A"), ("R", "G", "B"), ("Y", "A"), ("Y",))
 """Sets of channels that form an image. The first set that a file contains is read."""
 SUBSAMPLED = (
-    "holds luminance and subsampled chroma (channels such as Y, RY, BY), which are not read; "
+    "contains luminance and subsampled chroma (channels such as Y, RY, BY), which are not supported; "
     "convert it to R, G and B, for example with ImageMagick: magick IN.exr OUT.exr"
 )
 """Rest of the error message for channels that the package OpenEXR does not convert to colours."""
@@ -54,7 +54,7 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
         raise FileError(f"{path}: contains no images")
     sizes = {_measure(head["displayWindow"])[1] for head in heads}
     if len(sizes) > 1:
-        raise FileError(f"{path}: its parts have several sizes, {' and '.join(map(str, sorted(sizes)))}")
+        raise FileError(f"{path}: its parts must have the same size, got {' and '.join(map(str, sorted(sizes)))}")
     for head in heads:
         if "deep" in str(head["type"]):
             raise FileError(f"{path}: contains deep images, which are not supported")
@@ -63,7 +63,7 @@ def _read_parts(path: Path, limit: int) -> list[tuple[str, dict[str, Array], dic
     # A material has many channels, so allow up to 64 channels of ``limit`` pixels.
     count = sum(len(head["channels"]) for head in heads)
     if count * int(np.prod(next(iter(sizes)))) * 4 > 64 * 4 * limit:
-        raise LimitExceeded(f"{path}: {count} channels are too many for a limit of {limit} pixels")
+        raise LimitExceeded(f"{path}: contains {count} channels, too many for the limit of {limit} pixels")
     found = []
     with translate_errors(path, "decoding"):
         file = _open(path)
@@ -99,7 +99,9 @@ def read_image(path: Path, limit: int) -> Array:
     if channels.keys() & {"RY", "BY"}:
         raise FileError(f"{path}: {SUBSAMPLED}")
     if names not in PICTURES and len(names) != 1:
-        raise FileError(f"{path}: must have R G B, R G B A, Y, Y A or one channel, got {' '.join(names)}")
+        raise FileError(
+            f"{path}: must have the channels R G B, R G B A, Y or Y A, or a single channel, got {' '.join(names)}"
+        )
     if any(channels[name].dtype == np.uint32 for name in names):
         raise FileError(f"{path}: has channels of 32-bit integers, which are not supported")
     image = channels[names[0]] if len(names) == 1 else np.stack([channels[name] for name in names], axis=-1)

@@ -31,7 +31,7 @@ def as_path(path: PathLike) -> Path:
     if "\0" in os.fspath(path):
         raise FileError(f"{os.fspath(path)!r}: must not contain the null character")
     if any(len(os.fsencode(part)) > _LONGEST for part in Path(path).parts):
-        raise FileError(f"{os.fspath(path)[:40]}...: must be a name of at most {_LONGEST} bytes")
+        raise FileError(f"{os.fspath(path)[:40]}...: each name in the path must have at most {_LONGEST} bytes")
     return Path(path)
 
 
@@ -81,7 +81,7 @@ def check_length(path: Path, limit: int) -> None:
     """Check that a file is not much larger than an image of ``limit`` pixels needs."""
     length = check_file(path)
     if length > BYTES_PER_PIXEL * limit + 2**26:
-        raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
+        raise LimitExceeded(f"{path}: has {length} bytes, too many for the limit of {limit} pixels")
 
 
 def load(path: Path, limit: int) -> bytes:
@@ -162,7 +162,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
             raise FileError(f"{target}: must be the name of a file, got a folder")
         exists = os.path.lexists(final)
         if exists and not final.is_file():
-            raise FileError(f"{target}: is not a regular file and is not replaced")
+            raise FileError(f"{target}: is not a regular file, so it is not replaced")
         if not as_bool(overwrite, "overwrite") and exists:
             raise FileError(f"{target}: exists already; pass overwrite=True to replace it")
         if exists and not os.access(final, os.W_OK):

@@ -129,7 +129,7 @@ def detect_kind(path: Path) -> str:
         return "tga"
     if path.suffix.lower() == RAW:
         raise FileError(_raw.explain_raw(path))
-    raise FileError(f"{path}: must contain one of {', '.join(NAMES)}")
+    raise FileError(f"{path}: must be a file in one of the formats {', '.join(NAMES)}")
 
 
 def keeps_spacing(suffix: str) -> bool:
@@ -147,7 +147,7 @@ def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
     if spacing is None:
         return UNIT
     if not keeps_spacing(suffix):
-        raise InvalidInput(f"spacing: {suffix} cannot store it; use .nrrd, .nii, .nii.gz, .vti, .tif or .zarr")
+        raise InvalidInput(f"spacing: cannot be stored in {suffix}; use .nrrd, .nii, .nii.gz, .vti, .tif or .zarr")
     return check_spacing(spacing)
 
 
@@ -174,12 +174,12 @@ def check(value: object, suffix: str, axes: int) -> Array:
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, MemoryError) as error:
-        raise InvalidInput(f"array: must be an array of numbers ({_files.describe_error(error)})") from None
+        raise InvalidInput(f"array: must contain numbers ({_files.describe_error(error)})") from None
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
-        raise InvalidInput(f"array: must be bool, integers or floats, got dtype {array.dtype}")
+        raise InvalidInput(f"array: must contain bool, integers or floats, got dtype {array.dtype}")
     if array.ndim not in (axes, axes + 1) or array.size == 0:
         shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
-        raise InvalidInput(f"array: must have shape {shapes}, not empty; got shape {array.shape}")
+        raise InvalidInput(f"array: must have shape {shapes} and not be empty, got shape {array.shape}")
     check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
@@ -201,7 +201,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
     if suffix == ".gif":
         colours = np.unique(array.reshape(-1, channels), axis=0)
         if len(colours) > 256:
-            raise InvalidInput(f"array: .gif cannot store {len(colours)} colours, only 256; use .png or .webp")
+            raise InvalidInput(f"array: .gif cannot store {len(colours)} colours, but only 256; use .png or .webp")
         if channels == 4 and ((colours[:, 3] % 255).any() or (colours[:, 3] == 0).sum() > 1):
             raise InvalidInput("array: .gif cannot store more than one transparent colour; use .png or .webp")
     if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):

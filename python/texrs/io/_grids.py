@@ -33,12 +33,12 @@ def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
     def check(header: _npy.Header) -> None:
         shape = header.shape
         if len(shape) not in (axes, axes + 1):
-            what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
+            what = ("an image has shape (H, W) or (H, W, C)", "a volume has shape (D, H, W) or (D, H, W, C)")[axes - 2]
             hint = "; read it with texrs.io.read_volume" if axes == 2 and len(shape) == 4 else ""
-            raise FileError(f"{name}: contains an array of shape {shape}; {what}{hint}")
+            raise FileError(f"{name}: contains an array of shape {shape}, but {what}{hint}")
         channels = shape[axes] if len(shape) > axes else 1
         if channels > _MOST_CHANNELS:
-            raise FileError(f"{name}: must have at most {_MOST_CHANNELS} channels, got shape {shape} with {channels}")
+            raise FileError(f"{name}: must have at most {_MOST_CHANNELS} channels, got {channels} in shape {shape}")
         _files.check_size(name, shape[:axes], channels, header.dtype.itemsize, limit)
 
     return (_npy.read_npy if kind == "npy" else _npy.read_npz)(name, limit, check)

@@ -94,7 +94,7 @@ def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = 
         with _open_member(path, archive, chosen[0]) as file:
             array = _read_array(path, file, chosen[0].file_size, limit, check)
     if rest := [m.filename.removesuffix(".npy") for m in members if m is not chosen[0]]:
-        ignore(f"{path}: {', '.join(rest)} not used: only the array {_KEY!r} is read")
+        ignore(f"{path}: {', '.join(rest)} not used, because only the array {_KEY!r} is read")
     return array
 
 
@@ -193,7 +193,7 @@ def _open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     length = check_file(path)
     with translate_errors(path, "reading the archive"), path.open("rb") as file:
         if file.read(4) != b"PK\x03\x04":
-            raise FileError(f"{path}: is not an .npz file of {length} bytes")
+            raise FileError(f"{path}: is not an .npz file ({length} bytes)")
         with zipfile.ZipFile(file) as archive:
             yield archive
 
@@ -201,7 +201,7 @@ def _open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 @contextmanager
 def _open_member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Iterator[BinaryIO]:
     if member.compress_type not in _PACKINGS:
-        raise FileError(f"{path}: {member.filename} must be stored or compressed by deflate, as by NumPy")
+        raise FileError(f"{path}: {member.filename} must be uncompressed or compressed by deflate, as NumPy writes it")
     with archive.open(member) as stream:
         yield cast(BinaryIO, stream)
 
@@ -250,10 +250,13 @@ def _read_array(
     # It is not known here which axis contains channels, so compare only bytes.
     most = limit * BYTES_PER_PIXEL
     if size > most:
-        raise LimitExceeded(f"{path}: shape {shape} of {dtype} needs {size} bytes, more than the limit of {most}")
+        raise LimitExceeded(
+            f"{path}: an array of {dtype} and shape {shape} needs {size} bytes, more than the limit of {most}"
+        )
     if size > length - start:
         raise FileError(
-            f"{path}: is cut off; shape {shape} of {dtype} needs {size} bytes, but only {length - start} follow"
+            f"{path}: is cut off; an array of {dtype} and shape {shape} needs {size} bytes, but only "
+            f"{length - start} follow"
         )
     check_memory(size, str(path))
     flat = np.empty(prod(shape), dtype)

@@ -102,7 +102,7 @@ def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Se
             if pixels.itemsize == dtype.itemsize and dtype.kind in "ui":
                 pixels = pixels.view(dtype)
             if pixels.dtype != dtype and image.mode != "CMYK" and dtype != np.bool_:
-                raise FileError(f"{path}: Pillow reads {dtype} as {pixels.dtype}")
+                raise FileError(f"{path}: cannot be read, because Pillow decodes {dtype} as {pixels.dtype}")
             several.append(pixels if pixels.ndim == 3 else pixels[..., np.newaxis])
     return np.stack(several)
 
@@ -342,12 +342,12 @@ def _open(path: Path, kind: str, file: bytes | None = None) -> Iterator[Any]:
     except Image.DecompressionBombError:
         assert Image.MAX_IMAGE_PIXELS is not None
         raise LimitExceeded(
-            f"{path}: has more than the limit of Pillow, {2 * Image.MAX_IMAGE_PIXELS} pixels "
-            "(twice PIL.Image.MAX_IMAGE_PIXELS), which decodes this format"
+            f"{path}: has more than the limit of Pillow for this format, {2 * Image.MAX_IMAGE_PIXELS} pixels "
+            "(twice PIL.Image.MAX_IMAGE_PIXELS)"
         ) from None
     except UnidentifiedImageError:
         raise FileError(
-            f"{path}: is cut off, corrupt, or an unsupported kind of {name}; save it with 8 bits a channel, or as "
+            f"{path}: is cut off, corrupt, or an unsupported kind of {name}; save it with 8 bits per channel, or as "
             "PNG or TIFF"
         ) from None
     except NotImplementedError as error:
@@ -372,7 +372,7 @@ def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
         ):
             raise FileError(f"{path}: is cut off; some of its pixels are missing")
         if getattr(image, "pixel_format", "").startswith("BC6H"):
-            assume(f"{path}: {image.pixel_format} contains floats; read as 8 bits, values above 1 as 1")
+            assume(f"{path}: {image.pixel_format} contains floats, which are clipped to 1 and read with 8 bits")
     if kind == "psd" and any(number == 1057 and data[4:5] == b"\0" for number, _, data in image.resources):
         raise FileError(
             f"{path}: contains no flattened image; save it with 'maximize compatibility', or as TIFF or PNG"

@@ -43,7 +43,9 @@ class Raw:
         check_size(self.path, self.shape[:3], prod(self.shape[3:]), self.dtype.itemsize, limit)
         if length != need:
             sides = " x ".join(map(str, (*self.shape[2::-1], *self.shape[3:])))
-            raise FileError(f"{self.path}: {sides} of {self.dtype.name} need {need} bytes, but the file has {length}")
+            raise FileError(
+                f"{self.path}: {sides} samples of {self.dtype.name} need {need} bytes, but the file has {length}"
+            )
         with translate_errors(self.path, "reading"):
             volume = np.fromfile(self.path, self.dtype).reshape(self.shape)
         return volume.astype(self.dtype.newbyteorder("="), copy=False)
@@ -71,7 +73,7 @@ def make_raw(path: Path, shape: Sequence[int] | None, dtype: object) -> Raw:
     """Return the description of a headerless file whose shape and dtype are given as arguments."""
     if shape is None or dtype is None:
         missing, other = ("shape", "dtype") if shape is None else ("dtype", "shape")
-        raise InvalidInput(f"{missing}: must be given with {other}, to read samples without a header")
+        raise InvalidInput(f"{missing}: must be given together with {other}, because the file has no header")
     count = 4 if isinstance(shape, Sequence) and len(shape) == 4 else 3
     given = as_tuple(shape, "shape", count, "planes, rows, columns, and channels if there are several")
     sides = [as_int(n, "shape", 1, 2**31 - 1) for n in given]
@@ -90,6 +92,6 @@ def explain_raw(path: Path) -> str:
     side = round(size ** (1 / 3))
     example = f"{side}x{side}x{side}:uint8" if side**3 == size else "96x96x48:uint16"
     return (
-        f"{path}: has no header; write WIDTHxHEIGHTxDEPTH and the type after its name, as in {path}:{example} "
-        f"(types: {_KINDS}; after it :big for that byte order)"
+        f"{path}: has no header; add :WIDTHxHEIGHTxDEPTH:TYPE to its name, as in {path}:{example} "
+        f"(types: {_KINDS}; add :big for big-endian samples)"
     )

@@ -54,8 +54,8 @@ def list_slices(folder: Path, suffixes: Collection[str]) -> list[Path]:
     """
     groups = {names: group for names, group in _find_groups(folder, suffixes).items() if len(group) >= LEAST}
     if len(groups) != 1:
-        shown = " and ".join(f"{before}N{after}" for before, after in groups) or "no"
-        raise FileError(f"{folder}: contains {shown} numbered slices; a volume needs one series")
+        shown = " and ".join(f"{before}N{after}" for before, after in groups) or "none"
+        raise FileError(f"{folder}: must contain one series of numbered slices, got {shown}")
     (before, after), group = next(iter(groups.items()))
     first, last = min(group), max(group)
     missing = [n for n in range(first, last + 1) if n not in group]

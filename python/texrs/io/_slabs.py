@@ -18,7 +18,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
     if isinstance(shape, list | tuple) or (isinstance(shape, np.ndarray) and shape.ndim == 1):
         sides = tuple(shape[:5])
     if len(sides) not in (3, 4) or not all(isinstance(n, Integral) and 1 <= int(n) < 2**40 for n in sides):
-        raise InvalidInput(f"shape: must be (D, H, W) or (D, H, W, C) as integers of at least 1, got {shape!r}")
+        raise InvalidInput(f"shape: must be integers (D, H, W) or (D, H, W, C) of at least 1, got {shape!r}")
     return tuple(int(n) for n in sides)
 
 

@@ -145,7 +145,10 @@ def _report_others(path: Path, tif: Any, series: Any) -> None:
     if all(page is not None for page in series.pages):
         unused = sum(page.index not in taken and not page.is_reduced for page in tif.pages)
         if unused:
-            ignore(f"{path}: {unused} of {len(tif.pages)} pages not used: they do not form a stack with the first page")
+            ignore(
+                f"{path}: {unused} of {len(tif.pages)} pages not used, because they "
+                "do not form a stack with the first page"
+            )
 
 
 def count_planes(path: Path) -> int:
@@ -194,7 +197,7 @@ def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file as an upright image."""
     if planes.shape[0] != 1:
         raise FileError(
-            f"{path}: contains {planes.shape[0]} planes; read them with texrs.io.read_volume, or save one page only"
+            f"{path}: contains {planes.shape[0]} planes; read them with texrs.io.read_volume, or save a single page"
         )
     return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
@@ -330,7 +333,7 @@ def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[in
     """
     size = dict(zip(axes, shape, strict=True))
     if "Y" not in size or "X" not in size or len(size) != len(axes):
-        raise FileError(f"{path}: has the axes {axes}; an image needs rows and columns")
+        raise FileError(f"{path}: has the axes {axes}, but an image needs rows (Y) and columns (X)")
     channels = size.get("S", 1) * size.get("C", 1)
     planes = prod(n for axis, n in size.items() if axis not in "YXSC")
     return (planes, size["Y"], size["X"]), channels
@@ -395,7 +398,7 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
             size = _measure(key.compression, data, most)
             if size > most:
                 raise FileError(
-                    f"{path}: is corrupt; a strip expands to more than {most} bytes, more than its pixels need"
+                    f"{path}: is corrupt; a strip expands to more than the {most} bytes that its pixels need"
                 )
 
 

@@ -188,7 +188,7 @@ def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
     if len(sizes) == 3:
         return None
     if len(sizes) != 4:
-        raise FileError(f"{path}: must have three axes, and channels, got {len(sizes)} axes")
+        raise FileError(f"{path}: must have three axes, or four axes including channels, got {len(sizes)} axes")
     space = ("domain", "space", "???", "none", "")
     others = [a for a, kind in enumerate(kinds) if kind not in space]
     channel = others[0] if len(kinds) == 4 and len(others) == 1 else 0
@@ -214,14 +214,12 @@ def read_nifti(path: Path, limit: int) -> Array:
         sizes += [1] * (3 - len(sizes))
         several = [n for n in sizes[3:] if n != 1]
         if not 1 <= count <= 7 or len(several) > 1 or (several and (colours or several[0] > _MOST_CHANNELS)):
-            raise FileError(
-                f"{path}: must have three axes and at most {_MOST_CHANNELS} channels, got the sides {sizes}"
-            )
+            raise FileError(f"{path}: must have three axes and at most {_MOST_CHANNELS} channels, got sides of {sizes}")
         _check_sides(path, sizes)
         channels = several[0] if several else 1
         offset = float(header["vox_offset"])
         if not need <= offset <= (length or _LONGEST_HEADER) or offset != int(offset):
-            raise FileError(f"{path}: states that its samples start at byte {offset:g}")
+            raise FileError(f"{path}: is corrupt; its header states that the samples start at byte {offset:g}")
         check_size(path, tuple(sizes[2::-1]), max(channels, colours), dtype.itemsize // (colours or 1), limit)
         file.seek(int(offset))
         whole = prod(sizes)
@@ -249,13 +247,13 @@ def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], 
     nibabel: Any = _import_library("nibabel", "nibabel", path)
     start = file.read(540)
     if start[:4] not in NIFTI_MAGIC:
-        raise FileError(f"{path}: is compressed, but not a NIfTI file")
+        raise FileError(f"{path}: is compressed by gzip, but not a NIfTI file")
     second = start[:4] in NIFTI_MAGIC[2:]
     need = 540 if second else 348
     if len(start) < need:
         raise FileError(f"{path}: is cut off; its NIfTI header is incomplete")
     if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
-        raise FileError(f"{path}: must be a NIfTI file that contains its own samples")
+        raise FileError(f"{path}: must be a NIfTI file (.nii) that contains its samples, not a header for another file")
     kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -64,7 +64,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         dtype, channels = np.dtype(end + _TYPES[chosen.get("type", "")]), int(chosen.get("NumberOfComponents") or 1)
         sides = [int(n) + 1 if kind == "PointData" else max(int(n), 1) for n in (high - low)[::-1]]
         if min(sides) < 1 or not 1 <= channels <= _MOST_CHANNELS:
-            raise FileError(f"{path}: must have voxels and at most {_MOST_CHANNELS} channels")
+            raise FileError(f"{path}: must have at least one voxel and 1 to {_MOST_CHANNELS} channels")
         size = dtype.itemsize * channels * check_size(path, tuple(sides), channels, dtype.itemsize, limit)
         header = np.dtype(end + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         data = memoryview((chosen.text or "").strip().encode())
@@ -82,7 +82,7 @@ def read_vti(path: Path, limit: int, *, vectors: bool = False) -> Array:
         if len(samples) < size:
             raise FileError(f"{path}: is cut off; its samples need {size} bytes, but only {len(samples)} follow")
         if root[0].get("WholeExtent", "").split() != pieces[0].get("Extent", "").split():
-            raise FileError(f"{path}: must have a piece of the length of its whole extent")
+            raise FileError(f"{path}: its piece must cover the whole extent")
         shape = sides if channels == 1 else (*sides, channels)
         return np.frombuffer(samples, dtype, size // dtype.itemsize).reshape(shape).astype(dtype.newbyteorder("="))
 
@@ -113,11 +113,11 @@ def _unpack(
         there = _decode(data, one + size) if encoded else data
         length = int(np.frombuffer(there, header, count=1)[0])
         if length != size:
-            raise FileError(f"{path}: states that its samples have {length} bytes; its extent needs {size}")
+            raise FileError(f"{path}: states that its samples have {length} bytes, but its extent needs {size}")
         return memoryview(there)[one:]
     blocks = int(np.frombuffer(_decode(data, one) if encoded else data, header, count=1)[0])
     if not 0 < blocks <= size:
-        raise FileError(f"{path}: states that its samples are in {blocks} blocks")
+        raise FileError(f"{path}: is corrupt; it states that its samples are in {blocks} blocks")
     whole = (3 + blocks) * one
     lengths = np.frombuffer(_decode(data, whole) if encoded else data, header, count=3 + blocks)[3:].tolist()
     # The lengths of the blocks are encoded separately from the blocks.

@@ -165,10 +165,11 @@ def _find(path: Path) -> tuple[Any, tuple[str, ...] | None]:
     if len(names) == 1 and arrays:
         return node[arrays[0]], _name_axes(node[arrays[0]])
     if not names:
-        raise FileError(f"{path}: is an empty group of Zarr")
+        raise FileError(f"{path}: is a Zarr group that contains no arrays")
     shown = ", ".join(names[:8])
     raise FileError(
-        f"{path}: contains several arrays ({shown}); name one, as in {os.path.join(os.fspath(path), names[0])}"
+        f"{path}: contains several arrays or groups ({shown}); name one, as in "
+        f"{os.path.join(os.fspath(path), names[0])}"
     )
 
 

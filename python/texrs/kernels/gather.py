@@ -83,14 +83,16 @@ def gather(
     images = [as_image(e, "exemplars", axes=axes, finite=False) for e in several]
     kinds = {(e.dtype.str, e.shape[-1]) for e in images}
     if len(kinds) > 1:
-        raise InvalidInput(f"exemplars: must agree in dtype and channels, got {sorted(kinds)}")
+        raise InvalidInput(f"exemplars: must have the same dtype and number of channels, got {sorted(kinds)}")
     shape = points.shape[:-1]
     if which is None:
         index = np.zeros(0, np.uint16)
     else:
         index = as_array(which, "which", np.uint16, shape)
         if index.size and index.max() >= len(images):
-            raise InvalidInput(f"which: must be 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
+            raise InvalidInput(
+                f"which: must contain indices from 0 to {len(images) - 1}, got {index.min()} to {index.max()}"
+            )
     how = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
     dtype = images[0].dtype
     if dtype.kind in "ui" and dtype.itemsize == 8:

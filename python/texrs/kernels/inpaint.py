@@ -148,7 +148,7 @@ def inpaint(
 
     """
     if not isinstance(index, PatchIndex):
-        raise InvalidInput(f"index: must be a PatchIndex, got {type(index).__name__}")
+        raise InvalidInput(f"index: must be an instance of PatchIndex, got {type(index).__name__}")
     picture = as_array(colours, "colours", np.float32, ("rows", "columns", "channels"))
     mask = as_mask(known, "known", picture.shape[:2])
     # A copy takes 25 % of the time of `np.where`, which would expand the mask over the channels.

@@ -124,7 +124,7 @@ class PatchIndex:
         arrays = [_as_floats(v, name.format(i)) for i, v in enumerate(given)]
         channels = [a.shape[2] for a in arrays]
         if len(set(channels)) > 1:
-            raise InvalidInput(f"images: must agree in channels, got {channels}")
+            raise InvalidInput(f"images: must have the same number of channels, got {channels}")
         self.shapes: tuple[tuple[int, ...], ...] = tuple(a.shape for a in arrays)
         """Shape (H, W, C) of each image."""
         self._index = _rust.PatchIndex(arrays, _check_masks(masks, self.shapes, single), _as_patch(max_patch))
@@ -278,7 +278,9 @@ class PatchIndex:
             # check.
             tuple(
                 n if type(n) is int and 0 <= n <= high else as_int(n, "candidates", 0, high)
-                for n, high in zip(as_tuple(place, "candidates", 3, "(exemplar, row, column) each"), most, strict=True)
+                for n, high in zip(
+                    as_tuple(place, "candidates", 3, "(exemplar, row, column) for each candidate"), most, strict=True
+                )
             )
             for place in as_items(candidates, "candidates")
         ]

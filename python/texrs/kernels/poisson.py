@@ -157,7 +157,7 @@ def spread(
 
     """
     if as_array(flow, "flow", np.float32, ("rows", "columns", "channels")) is not flow or not flow.flags.writeable:
-        raise InvalidInput("flow: must be a float32 array, contiguous, writeable and in native byte order")
+        raise InvalidInput("flow: must be a contiguous and writeable float32 array in native byte order")
     _rust.poisson_spread(
         flow,
         _as_weight(screening),
@@ -313,7 +313,9 @@ def _as_weight(screening: object) -> float:
 
 def _check_finite(solved: Floats) -> Floats:
     if not np.isfinite(solved).all():
-        raise InvalidInput("image: must have values and differences whose squares fit into float32")
+        raise InvalidInput(
+            "image: must have smaller values, because squares of values or of differences overflow float32"
+        )
     return solved
 
 
@@ -324,5 +326,7 @@ def _as_boundary(boundary: object) -> tuple[str, str]:
         or len(both) != 2
         or any(not isinstance(b, str) or b not in _BOUNDARIES for b in both)
     ):
-        raise InvalidInput(f"boundary: must be one of {', '.join(_BOUNDARIES)}, or two of them; got {boundary!r}")
+        raise InvalidInput(
+            f"boundary: must be one of {', '.join(_BOUNDARIES)}, or two of them as a pair; got {boundary!r}"
+        )
     return both[0], both[1]

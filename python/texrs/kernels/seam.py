@@ -347,7 +347,7 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
     given = []
     for strip in as_items(strips, "strips"):
         if not isinstance(strip, Strip):
-            raise InvalidInput(f"strips: must each be a Strip, got {type(strip).__name__}")
+            raise InvalidInput(f"strips: each entry must be an instance of Strip, got {type(strip).__name__}")
         first = as_array(strip.a, "strips: a", np.float32, ("rows", "columns", "channels"))
         second = as_array(strip.b, "strips: b", np.float32, first.shape)
         dear = None if strip.penalty is None else _as_floats(strip.penalty, "strips: penalty", first.shape[:2])
@@ -424,7 +424,7 @@ def binary_labels(
     entries = (pairwise,) * axes if isinstance(pairwise, Real) else as_tuple(pairwise, "pairwise", axes, what)
     both = [entry if isinstance(entry, tuple) else (entry, entry) for entry in entries]
     if any(len(entry) != 2 for entry in both):
-        raise InvalidInput("pairwise: must have two entries in a tuple, False before True and True before False")
+        raise InvalidInput("pairwise: a tuple must contain two costs, of False before True and of True before False")
     forward, backward = ([_as_floats(entry[i], "pairwise", shape) for entry in both] for i in (0, 1))
     mask, energy = _rust.seam_labels(costs, forward, backward, as_wrap(wrap, axes=axes))
     return Labels(mask.reshape(shape), energy)
@@ -459,7 +459,7 @@ def _as_floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
 
 def _as_seams(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
     if not isinstance(old, OldSeams):
-        raise InvalidInput(f"old: must be OldSeams, got {type(old).__name__}")
+        raise InvalidInput(f"old: must be an instance of OldSeams, got {type(old).__name__}")
     fields = []
     for name in ("old.kept", "old.ab", "old.ba"):
         arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one per axis")

@@ -152,7 +152,7 @@ def _list_entries(
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
         raise InvalidInput(f"{name}: must have shape (n, n), got {matrix.shape}")
     if matrix.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: must be real numbers, got dtype {matrix.dtype}")
+        raise InvalidInput(f"{name}: must contain real numbers, got dtype {matrix.dtype}")
     check_memory(8 * matrix.shape[0], name)
     columns = csc_array(matrix)
     if not columns.has_canonical_format:
@@ -160,6 +160,8 @@ def _list_entries(
         columns = columns.copy()
         columns.sum_duplicates()
     if max(columns.nnz, columns.shape[0]) >= 1 << 31:
-        raise InvalidInput(f"{name}: must have at most 2^31 rows and entries, got {columns.shape[0]} and {columns.nnz}")
+        raise InvalidInput(
+            f"{name}: must have fewer than 2^31 rows and entries, got {columns.shape[0]} rows and {columns.nnz} entries"
+        )
     starts, rows = (np.ascontiguousarray(x, np.int32).view(np.uint32) for x in (columns.indptr, columns.indices))
     return starts, rows, as_array(columns.data, name, np.float64)

@@ -218,7 +218,7 @@ def check_time(end: tuple[float, float] | None, stage: str, share: float) -> Non
     """
     if end is not None and time.monotonic() > end[0]:
         raise LimitExceeded(
-            f"the limit of {end[1]:.3g} s was reached in the stage {stage!r}, at {share:.0%} of its work"
+            f"the time limit of {end[1]:.3g} s was reached in the stage {stage!r}, at {share:.0%} of its progress"
         )
 
 

@@ -146,4 +146,6 @@ def _as_shape(value: Any, axes: int, name: str = "exemplar") -> tuple[int, ...]:
         sides = tuple(value)
         if all(not isinstance(n, bool) and isinstance(n, numbers.Integral) and int(n) > 0 for n in sides):
             return tuple(map(int, sides))
-    raise InvalidInput(f"{name}: must be a shape of {axes} sides, with or without channels, got {value!r}")
+    raise InvalidInput(
+        f"{name}: must be a shape of {axes} sides, optionally followed by the number of channels, got {value!r}"
+    )

@@ -65,7 +65,7 @@ def follow_boxes(
     given = as_array(boxes, "boxes", np.float64)
     given = given.reshape(0, 4) if given.size == 0 and given.ndim < 2 else given
     if given.ndim != 2 or given.shape[1] < 4:
-        raise InvalidInput(f"boxes: must have shape (n, 4 or more), got {given.shape}")
+        raise InvalidInput(f"boxes: must have shape (n, k) with k of at least 4, got {given.shape}")
     check_finite(given, "boxes")
     share = as_float(min_visible, "min_visible", 0, 1)
     count, piece = _find_pieces(source)

@@ -85,7 +85,7 @@ def _to_array(picture: Any) -> Any:
     if not isinstance(picture, torch.Tensor):
         return picture
     if picture.ndim not in (2, 3):
-        raise InvalidInput(f"inputs: must be one image (C, H, W) at a time, got shape {tuple(picture.shape)}")
+        raise InvalidInput(f"inputs: must contain one image (C, H, W), not a batch, got shape {tuple(picture.shape)}")
     array = picture.detach().cpu().as_subclass(torch.Tensor).numpy()
     return array if picture.ndim == 2 else np.moveaxis(array, 0, -1)
 
