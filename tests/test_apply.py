@@ -43,9 +43,9 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 CASES = [
-    ("rock_normal_gl.png", ["--map-type", "normal", "--green", "up"], "read as normals, y up"),
-    ("rock_nor_dx.png", ["--map-type", "normal", "--green", "down"], "read as normals, y down"),
-    ("rock_flow.png", ["--map-type", "vector", "--green", "up"], "read as vectors, y up"),
+    ("rock_normal_gl.png", ["--map-type", "normal", "--green", "up"], "read as normals with y up"),
+    ("rock_nor_dx.png", ["--map-type", "normal", "--green", "down"], "read as normals with y down"),
+    ("rock_flow.png", ["--map-type", "vector", "--green", "up"], "read as vectors with y up"),
     ("rock_mask.png", ["--map-type", "label"], "read as labels"),
     ("rock_labels.png", ["--map-type", "label"], "read as labels"),
     ("x.png", ["--map-type", "label"], "read as labels, because its integers form regions of unrelated values"),
@@ -57,8 +57,8 @@ CASES = [
 @pytest.mark.parametrize(
     ("names", "says", "options"),
     [
-        (["T_Rock_N"], "read as normals, y down", ["--map-type", "normal", "--green", "down"]),
-        (["stone_n", "stone_h"], "read as normals, y up", ["--map-type", "normal", "--green", "up"]),
+        (["T_Rock_N"], "read as normals with y down", ["--map-type", "normal", "--green", "down"]),
+        (["stone_n", "stone_h"], "read as normals with y up", ["--map-type", "normal", "--green", "up"]),
         (
             ["stone_n", "stone"],
             "stone_n.png: read as normal (the folder has other maps of stone)",

@@ -559,7 +559,9 @@ def test_what_no_map_holds_is_written_as_usual_and_said(tmp_path: Path) -> None:
     material = Material({"albedo": DOTS.image, "metallic": DOTS.image[..., 0]})
     with collect() as notices:
         material.save(tmp_path, convention="unity")
-    assert notices.assumed == ["MetallicSmoothness: some of its quantities have no map; written with smoothness 0.4"]
+    assert notices.assumed == [
+        "MetallicSmoothness: some of its quantities have no map, so it is written with smoothness 0.4"
+    ]
     assert (io.read(tmp_path / "MetallicSmoothness.png")[..., 3] == 102).all()
 
 

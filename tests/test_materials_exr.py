@@ -182,9 +182,9 @@ def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
     ]
     assert back.notices.assumed == [
         f"{path}: Combined: colours are not divided by alpha, because pixels with an alpha of 0 are not black",
-        f"{path}: Depth, Mist read as other: a distance from the camera is not a height",
+        f"{path}: Depth, Mist read as other, because a distance from the camera is not a height",
         f"{path}: IndexOB read as labels",
-        f"{path}: Normal read as tangent-space normals, y up; a render has them in world space",
+        f"{path}: Normal read as tangent-space normals with y up, although normals of a render are in world space",
     ]
     assert back.base_name == "Combined"
     with pytest.warns(InputWarning):
@@ -192,7 +192,7 @@ def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
     assert stated["Depth"].role is Role.HEIGHT
     assert stated.notices.assumed[1:] == [
         f"{path}: IndexOB read as labels",
-        f"{path}: Mist read as other: a distance from the camera is not a height",
+        f"{path}: Mist read as other, because a distance from the camera is not a height",
     ]
 
 

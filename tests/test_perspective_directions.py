@@ -131,7 +131,7 @@ def test_same_bytes_for_any_number_of_threads(lines, count):
         ({"direction": 9.0, "method": "paper"}, "method: 'paper' cannot be combined with a surface"),
         (
             {"direction": np.array([[0.0, 90.0]]), "wrap": (False, True)},
-            "wrap: the directions of the first and last columns",
+            "wrap: directions of the first and last columns",
         ),
     ],
 )

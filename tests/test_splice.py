@@ -422,7 +422,7 @@ def test_layouts_that_shrink_leave_no_bare_margin(name: str, factor: float) -> N
 
 @pytest.mark.parametrize("name", ["net", "bricks"])
 def test_what_is_connected_cannot_be_removed(name: str) -> None:
-    with pytest.raises(InvalidInput, match="remove needs separate elements"):
+    with pytest.raises(InvalidInput, match="the step remove needs separate elements"):
         texrs.self_splice(ENTRIES[name], [{"op": "shift", "by": 2}, {"op": "remove", "element": 3}])
 
 

@@ -251,7 +251,7 @@ def test_uneven_light_is_evened_and_reported():
     assert kept.report["unchanged"] == pytest.approx(kept.report["in_place"], abs=0.01)
     assert kept.report["flatten_lighting"] is False
     [said] = [each for each in made.report["assumed"] if "unevenly" in each]
-    assert said.startswith("image: is lit unevenly, one part 2.")
+    assert said.startswith("image: is lit unevenly, because one part is 2.")
     ends = [np.ptp([part.mean() for part in np.array_split(each.image, 8, axis=1)]) for each in (made, kept)]
     assert ends[0] < 0.4 * ends[1]
 

@@ -217,7 +217,7 @@ def _measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDA
     near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
     if len(near) < SMALLEST:
         raise InvalidInput(
-            f"resolution: must be smaller for this plane, got {resolution:.3g}; almost none of it is sharp"
+            f"resolution: must be smaller for this plane, got {resolution:.3g}; almost no part of the plane is sharp"
         )
     points = plane.flatten(near)
     return points.min(axis=0), points.max(axis=0)

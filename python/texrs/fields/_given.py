@@ -95,7 +95,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
     given = try_array(array)
     count = given.shape[-1] if given.ndim else 0
     if extent is not None and not isinstance(extent, Sequence):
-        raise InvalidInput(f"extent: must be a sequence of the sides of the output, got {extent!r}")
+        raise InvalidInput(f"extent: must be the shape of the output as a sequence, got {extent!r}")
     if count in (2, 3) and given.ndim == count + 1:
         field = from_directions(given, extent if extent is None or len(extent) == count else None, **options)
     elif count in (2, 3) and given.ndim == count + 2:

@@ -76,7 +76,9 @@ def find_distances(spacing: Sequence[float] | None, value: object, axes: int) ->
         return spacing
     stated, name = _origins.find_spacing(value)
     if stated is not None and stated != (1.0, 1.0, 1.0):
-        assume(f"{name}: voxels of {' x '.join(f'{s:g}' for s in stated)} (plane, row, column), as the file states")
+        assume(
+            f"{name}: the voxel size is {' x '.join(f'{s:g}' for s in stated)} (plane, row, column), as the file states"
+        )
     return stated
 
 

@@ -167,7 +167,7 @@ def choose_kind(
         assume(f"{title}: read as {REASON}")
     y: Green = green or ("down" if role is not None and role.down else "up")
     if map_type is None and role is not None and usual in ("normal", "vector"):
-        assume(f"{title}: read as {usual}s, y {y}")
+        assume(f"{title}: read as {usual}s with y {y}")
     elif map_type is None and role is not None and usual == "label":
         assume(f"{title}: read as labels, whose values are not mixed")
     elif name is not None and map_type is None and role is None and found == "colour":

@@ -226,11 +226,11 @@ def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
         return None, "it contains infinite values or NaN"
     if role.normal:
         up = "down" if role is Role.NORMAL_DX else "up"
-        return role, f"tangent-space normals, y {up}; a render has them in world space"
+        return role, f"tangent-space normals with y {up}, although normals of a render are in world space"
     if role is Role.LABELS:
         return role, "labels"
     distance = word in ("depth", "z", "mist")
-    return role, "other: a distance from the camera is not a height" if distance else ""
+    return role, "other, because a distance from the camera is not a height" if distance else ""
 
 
 def sort_channels(letters: Mapping[str, Array]) -> list[Array]:

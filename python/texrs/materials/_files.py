@@ -90,7 +90,7 @@ def read_maps(path: Path | Sequence[Path], roles: dict[str, Role | str], axes: i
     short = shorten([stems[name] for name in maps])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
-        raise FileError(f"{path}: must have one file for the map {twice}, got two")
+        raise FileError(f"{path}: must contain only one file for the map {twice}, got two")
     report_guesses(why, guessed, {stems[name] for name in said})
     named = {key: replace(each, file=stems[name]) for key, (name, each) in zip(short, maps.items(), strict=True)}
     return named, {key for key, name in zip(short, maps, strict=True) if name in said}

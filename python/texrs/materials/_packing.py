@@ -167,7 +167,7 @@ def join(found: Mapping[str, Map], role: Role, shape: tuple[int, ...], file: str
     missing = [word for word in dict.fromkeys(layout) if word and word not in found]
     if missing and role.packed:
         values = ", ".join(f"{word} {USUAL.get(word, 0.0):g}" for word in missing)
-        assume(f"{file or role.value}: some of its quantities have no map; written with {values}")
+        assume(f"{file or role.value}: some of its quantities have no map, so it is written with {values}")
     bands = []
     for word in layout:
         if word not in found:

@@ -130,7 +130,7 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
     if marked in (0, total):
         what = "marks nothing" if marked == 0 else "marks every pixel"
         raise InvalidInput(
-            f"mask: must mark features, but it {what}; mark the elements or the gaps between them, or use angles"
+            f"mask: must mark features, but it {what}; mark the elements or the gaps between them, or give the scale by angles"
         )
 
 
@@ -145,8 +145,8 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
     typical = float(np.median(density[enough]))
     if typical <= 0 or _count_area(mask, known) < _FEWEST * spacing**2:
         raise InvalidInput(
-            f"mask: must mark more features per window of {window} pixels; mark more of them, or use a larger "
-            "window or angles"
+            f"mask: must mark more features per window of {window} pixels; mark more features, use a larger "
+            "window, or give the scale by angles"
         )
     ratio = np.clip(density / typical, _WIDEST ** (-1 / power), _WIDEST ** (1 / power))
     logs = np.float32(-power) * log_single(ratio)

@@ -80,7 +80,7 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
     wanted = {"coordinates": (*shape, len(shape)), "exemplar": shape, "label": shape}
     for name, shaped in wanted.items():
         if headers[name].shape != shaped or len(shape) not in (2, 3):
-            raise FileError(f"{path}: is damaged ({name} of shape {headers[name].shape})")
+            raise FileError(f"{path}: is damaged ({name} has shape {headers[name].shape})")
     # A damaged or hostile file may declare arrays of any size, so limit each.
     most = {
         "texrs_source_map": 8,
@@ -99,7 +99,9 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
     chosen = [name for name in most if name in headers]
     for name in chosen:
         if headers[name].size > most[name]:
-            raise FileError(f"{path}: is damaged ({name} of {headers[name].dtype}, shape {headers[name].shape})")
+            raise FileError(
+                f"{path}: is damaged ({name} has dtype {headers[name].dtype} and shape {headers[name].shape})"
+            )
     if sum(headers[name].size for name in known) > limit:
         raise LimitExceeded(f"{path}: the masks of its exemplars have more pixels than the limit of {limit}")
     return [*chosen, *known]

@@ -57,6 +57,6 @@ def _is_lit_unevenly(image: Array, name: str, space: Space | None = None) -> boo
     times = round(measure_unevenness(pixels, space), 2)
     if times >= UNEVEN:
         assume(
-            f"{name}: is lit unevenly, one part {times:g} times brighter than another part; its light is evened out first"
+            f"{name}: is lit unevenly, because one part is {times:g} times as bright as another; its light is evened out first"
         )
     return times >= UNEVEN

@@ -136,7 +136,8 @@ def parse_transfer(text: str) -> list[Stop]:
             stops.append((float(value), None if colour == "own" else colour, float(alpha)))
         except ValueError:
             raise InvalidInput(
-                f"transfer: must be VALUE:COLOUR:ALPHA, as in 0:own:0,0.6:#cc3322:0.2; got {part.strip()!r}"
+                f"transfer: must be VALUE:COLOUR:ALPHA stops separated by commas, such as "
+                f"0:own:0,0.6:#cc3322:0.2; got {part.strip()!r}"
             ) from None
     return stops
 

@@ -34,8 +34,8 @@ def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> S
         if closed and across > 2 * float(np.abs(np.diff(turn, axis=axis)).max(initial=0.0)) + 0.02:
             name = ("rows", "columns")[axis]
             raise InvalidInput(
-                f"wrap: the directions of the first and last {name} differ, so the result cannot repeat along {name}; "
-                f"make them equal, or omit wrap along {name}"
+                f"wrap: directions of the first and last {name} differ, so the result cannot repeat along {name}; "
+                f"make them equal, or turn off wrap along {name}"
             )
     return turn
 

@@ -228,6 +228,6 @@ def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: b
             name = ("rows", "columns")[axis]
             way = "give a target that repeats" if stretched else "make the target repeat"
             raise InvalidInput(
-                f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}; {way}, or leave wrap off "
+                f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}; {way}, or turn off wrap "
                 f"along {name}"
             )

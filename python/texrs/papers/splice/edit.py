@@ -161,7 +161,7 @@ def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
 
 def _move_element(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     if ("by" in step) == ("to" in step):
-        raise InvalidInput("edit: move must have either 'by' or 'to'")
+        raise InvalidInput("edit: the step move must have either 'by' or 'to'")
     out, i = at.copy(), _read_element(step, originals)
     out[i] = at[i] + _read_pair(step, "by") if "by" in step else _read_pair(step, "to")
     return out

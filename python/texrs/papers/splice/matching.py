@@ -369,7 +369,7 @@ def edit_layout(a: ElementAnalysis, steps: Sequence[Step], *, labels: bool = Fal
     cuts.
     """
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
-        raise InvalidInput(f"edit: remove needs separate elements, got {a.layout.value} elements")
+        raise InvalidInput(f"edit: the step remove needs separate elements, got {a.layout.value} elements")
     points = list_element_points(a)
     trial = apply_steps(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
