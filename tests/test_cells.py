@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from texrs import samples
 from texrs.errors import InvalidInput
-from texrs.exemplar.cells import Cells, find_cells
+from texrs.exemplar.cells import Cells, fill_gaps, find_cells
 from texrs.exemplar.contours import POINTS, measure_moments, measure_profiles, resample, trace
 from texrs.exemplar.merging import join_least_parted, join_parts, measure_usual_area
 
@@ -198,3 +198,16 @@ def test_background_is_joined_with_none() -> None:
 
 def test_crumbs_hardly_count_in_the_usual_area() -> None:
     assert measure_usual_area(np.array([100.0, 110, 120, *[1] * 50])) == 110
+
+
+def test_missed_cells_are_filled_in() -> None:
+    labels = np.arange(1, 26, dtype=np.int32).reshape(5, 5).repeat(20, axis=0).repeat(20, axis=1)
+    rows, columns = np.indices(labels.shape) % 20
+    labels[(np.minimum(rows, columns) < 2) | (np.maximum(rows, columns) > 17)] = 0
+    assert (fill_gaps(labels) == labels).all()
+    missed = np.where(labels == 13, 0, np.where(labels > 13, labels - 1, labels)).astype(np.int32)
+    filled = fill_gaps(missed)
+    assert filled.max() == 25
+    assert (filled[missed > 0] == missed[missed > 0]).all()
+    both = ((filled == 25) & (labels == 13)).sum() / ((filled == 25) | (labels == 13)).sum()
+    assert both > 0.9

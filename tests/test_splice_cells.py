@@ -311,3 +311,27 @@ def test_mean_values_carry_linear_maps() -> None:
     inside = np.random.default_rng(0).uniform(-6, 6, (1, 50, 2))
     matrix = np.array([[1.2, 0.3], [-0.1, 0.8]])
     assert np.abs(interpolate(inside, outline, outline @ matrix) - inside @ matrix).max() < 1e-3
+
+
+def test_heaps_are_composed_of_cells_unless_they_are_called_separate() -> None:
+    image = samples.load("beans", size=(160, 160)).image
+    heap = texrs.elements.analyse(image)
+    assert heap.report["found"] == "heap"
+    assert heap.layout == Layout.DISJOINT
+    assert texrs.splice(heap, DOTS, 128).report["method"] == "cells"
+    # The elements stay whole if they only move.
+    assert texrs.self_splice(heap, "randomise").report["method"] == "default"
+    assert find_entry_cells(texrs.elements.analyse(image, layout="disjoint")) is None
+
+
+def test_cells_without_a_joint_on_one_side_are_not_trusted() -> None:
+    wall = texrs.elements.analyse(samples.bricks((192, 192)).image)
+    assert wall.known is not None
+    known = wall.known.copy()
+    # Divide a brick where it has no joint.
+    brick = np.argwhere(known == 1)
+    middle = int(brick[:, 1].mean())
+    known[tuple(brick[brick[:, 1] > middle].T)] = known.max() + 1
+    cells = find_entry_cells(replace(wall, known=known))
+    assert cells is not None
+    assert cells.certain[0] < 0.5 < np.median(cells.certain)

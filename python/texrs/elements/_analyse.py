@@ -14,11 +14,10 @@ from texrs._arrays import as_image, check_work, guidance, to_lab
 from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
-from texrs.elements._arguments import Arguments, Box, check_consistency, choose_usual_box, find_contradiction
-from texrs.elements._cellular import start_from_cells
-from texrs.elements._consensus import extend_mask
+from texrs.elements._arguments import Arguments, check_consistency, find_contradiction
 from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import ElementAnalysis
+from texrs.elements._finder_view import FEWEST, View, view_elements
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
 from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
@@ -28,12 +27,8 @@ from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.point_sets import directions, spacing
 
-FEWEST = 3
-"""Minimum number of elements of a texture."""
 SHORTEST = 16
 """Minimum side of an image, in pixels."""
-AGAIN = 0.8
-"""Minimum number of elements found with a better box, as a share of the number found with the proposed box."""
 SURE = 0.9
 """Confidence of the analysis of a material's colours above which its other maps are not analysed."""
 LITTLE, MUCH = 0.02, 0.95
@@ -57,11 +52,11 @@ def analyse(
 ) -> ElementAnalysis:
     """Find the elements of a texture, their pixels and their layout [1]_.
 
-    All arguments except the image are optional. The element, the background and the layout are proposed if they are
-    not given, and the report contains the confidence of each proposal. If joints divide the whole image, as in a wall
-    or a honeycomb, the elements are the cells, each with its own shape. If a ``box`` is given, cells are used only if
-    they are about as large as the box. Otherwise, or if a ``search`` is given, the elements are the places that look
-    like the chosen element.
+    All arguments except the image are optional. The elements are those of `texrs.exemplar.element_finder`, which DESIGN
+    uses as well. The report contains the confidence of the layout and of the elements. The layout of a heap is
+    "disjoint", and the report's ``"found"`` is "heap". If ``layout`` or ``background`` is given, it replaces what was
+    found. With a ``box``, the elements like the one in the box remain. If no element has the size of the box, the
+    elements are the places that look like the box. The same applies if a ``mask`` or a ``search`` is given.
 
     Parameters
     ----------
@@ -76,8 +71,8 @@ def analyse(
         Mask of the foreground. If it is within the box, it is the foreground of the chosen element. Otherwise it is
         the foreground of the whole image, and the graph cut is skipped. Default: found by a graph cut.
     background : (n, 2) points or (H, W) array of bool, optional
-        Points (row, column) between the elements, where each marks a radius of 4 pixels. Python also accepts a mask of
-        all known background.
+        Points (row, column) between the elements, where each marks a radius of 4 pixels. Elements that they hit are
+        removed. Python also accepts a mask of all known background.
     layout : Layout or str, optional
         Layout of the elements: separate ("disjoint"), a connected foreground ("connected"), or separated by joints
         ("jointed"). The paper's "F=d", "F=c" and "B=c" are accepted. Default: the layout that is found.
@@ -91,7 +86,7 @@ def analyse(
     wrap : bool or (rows, columns)
         Axes along which the texture is tileable. Python also accepts a single bool for both. Default: none.
     seed : int
-        Seed of the random samples that the colour models are fitted to. Default: 0.
+        Seed of the random samples that colours are learned from. Default: 0.
     corrections : sequence of dict, optional
         Corrections of the result (`texrs.elements.correct`).
     progress : callable or True, optional
@@ -101,7 +96,8 @@ def analyse(
     Returns
     -------
     ElementAnalysis
-        The analysis: points in order of falling similarity, mask, layout and the directions of rows of points.
+        The analysis: points in order of falling confidence or similarity, mask, layout and the directions of rows of
+        points.
 
     Raises
     ------
@@ -137,39 +133,57 @@ def analyse(
     watch = progress or (lambda stage, share: None)
     guide = _repeat_channel(guidance(pixels))
 
-    # 1. Use the given element, background and layout, or propose them.
-    plain = search == ElementSearch() and not how.literal and not any(how.wrap)
-    cellular = start_from_cells(guide, given, watch) if plain else None
-    start = propose(guide, given, how.wrap, partial(watch, "propose")) if cellular is None else cellular.start
+    # 1. Use the elements of the finder if the foreground, the points or a search are not given.
+    free = given.mask is None and given.points is None and search == ElementSearch() and not how.literal
+    view = view_elements(guide, given, how.wrap, seed, watch) if free else None
+    entry = _search(pixels, guide, given, how, watch) if view is None else _take_view(pixels, given, view, how)
+    watch("separate", 1.0)
+    unsure = [
+        f"{name} is proposed, {sure:.0%} sure: {ADVICE[name]}"
+        for name, sure in entry.report["confidence"].items()
+        if sure < DOUBTFUL
+    ]
+    entry = replace(entry, report={**entry.report, "warnings": [*entry.report["warnings"], *unsure]})
+    return correct(entry, steps)
+
+
+def _take_view(pixels: Array, given: Arguments, view: View, how: Settings) -> ElementAnalysis:
+    """Return the elements of the finder as an analysis."""
+    places = find_nearest_pixels(view.points, view.mask.shape)
+    found = Detections(
+        np.stack(places, axis=-1),
+        view.points,
+        view.confidence,
+        np.zeros(len(view.points), np.intp),
+        np.ones(view.mask.shape, np.float32),
+        -1.0,
+        None,
+    )
+    likely = {"box": float(view.confidence[0]), "background": float(view.confidence.mean()), "layout": view.sure}
+    sure = {name: value for name, value in likely.items() if getattr(given, name) is None}
+    start = Start(view.box, view.layout, given.background, list(sure), sure)
+    parted = Separation(view.points, view.confidence, np.arange(len(view.points)), view.mask, "finder")
     _check(given, start, how)
+    entry = _make_entry(pixels, given, start, found, parted, how)
+    report = entry.report if given.layout is not None else {**entry.report, "found": view.found}
+    return replace(entry, known=view.labels, report=report)
 
-    # 2. Find the places that look like the element.
-    seen = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
 
-    # 3. Find the pixels of the elements.
+def _search(pixels: Array, guide: Floats, given: Arguments, how: Settings, watch: Progress) -> ElementAnalysis:
+    """Find the places that look like one element, and their pixels."""
+    start = propose(guide, given, how, partial(watch, "propose"))
+    _check(given, start, how)
+    seen = _detect(guide, given, start, how, partial(watch, "search"))
     watch("separate", 0.0)
     with answering(watch, "separate", 0.0):
-        parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
-    watch("separate", 0.2)
-    start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
+        parted = _separate(guide, given, start, seen, how)
     if len(parted.points) < FEWEST:
         lower = f"a threshold below {seen.threshold:.2f}, " if seen.threshold > -1 else ""
         raise InvalidInput(
             f"image: must show at least {FEWEST} elements, found {len(parted.points)}; try another box, "
             f"more rotations or scales, {lower}or give the points"
         )
-    watch("separate", 0.3)
-    again = _reanalyse(pixels, given, start, parted, how, lambda name, share: watch("separate", 0.3))
-    entry = again or _make_entry(pixels, given, start, seen, parted, how)
-    entry = entry if cellular is None else replace(entry, known=cellular.labels)
-    watch("separate", 1.0)
-    unsure = [
-        f"{name} is proposed, {sure:.0%} sure: {ADVICE[name]}"
-        for name, sure in start.confidence.items()
-        if sure < DOUBTFUL
-    ]
-    entry = replace(entry, report={**entry.report, "warnings": [*entry.report["warnings"], *unsure]})
-    return correct(entry, steps)
+    return _make_entry(pixels, given, start, seen, parted, how)
 
 
 def _choose_map(material: Material, look: Callable[[Array], ElementAnalysis]) -> ElementAnalysis:
@@ -246,22 +260,6 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
     return plain
 
 
-def _extend(
-    guide: Floats, given: Arguments, start: Start, parted: Separation, how: Settings
-) -> tuple[Start, Separation]:
-    """Extend separate elements by surroundings common to all. Points and masks from the user are not changed."""
-    said = given.points is not None or given.whole is not None or given.shape is not None
-    if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
-        return start, parted
-    sure = parted.made_by == "cut"
-    found = extend_mask(to_lab(guide), parted.mask, parted.points, start.box.size, how.wrap, sure=sure)
-    if found is None:
-        return start, parted
-    points = np.clip(found.points, 0, np.array(found.mask.shape) - 1)
-    start = replace(start, box=Box(start.box.centre, found.box))
-    return start, replace(parted, mask=found.mask, points=points, made_by="consensus")
-
-
 def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:
     """Separate the foreground from the background by their colours (section 3.3)."""
     mask = _mask.cut_foreground(
@@ -280,37 +278,6 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
         return mask
     area = float(_mask.ellipse(start.box.size).sum())
     return _mask.tidy_mask(mask, area, net=start.layout != Layout.DISJOINT)
-
-
-def _reanalyse(
-    pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings, progress: Progress
-) -> ElementAnalysis | None:
-    """Repeat an analysis with the box of a typical element that was found.
-
-    This helps because a proposed box is not always centred on an element.
-
-    Return None if the box was given, or if the new box finds far fewer elements.
-    """
-    disjoint = start.layout == Layout.DISJOINT and parted.made_by == "cut"
-    if "box" not in start.proposed or not disjoint or how.literal or given.points is not None:
-        return None
-    try:
-        middle = choose_usual_box(parted.mask, Layout.DISJOINT, how.wrap)
-        again = analyse(
-            pixels,
-            box=(*middle.centre, *middle.size),
-            background=start.background,
-            layout=Layout.DISJOINT,
-            search=how.search,
-            wrap=how.wrap,
-            seed=how.seed,
-            progress=progress,
-        )
-    except InvalidInput:
-        return None
-    if len(again.points) < AGAIN * len(parted.points):
-        return None
-    return replace(again, report={**again.report, "proposed": start.proposed, "confidence": start.confidence})
 
 
 def _make_entry(
@@ -351,7 +318,9 @@ def _make_entry(
 def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settings) -> list[str]:
     """Return warnings about an implausible result."""
     share = parted.mask.mean()
-    found = [] if given.whole is not None else [find_contradiction(parted.mask, start.layout, how.wrap)]
+    # Known elements may touch each other.
+    said = given.whole is not None or parted.made_by == "finder"
+    found = [] if said else [find_contradiction(parted.mask, start.layout, how.wrap)]
     if not LITTLE <= share <= MUCH:
         found.append(f"{share:.0%} of the image is foreground")
     return [doubt for doubt in found if doubt]

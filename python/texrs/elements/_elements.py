@@ -19,7 +19,7 @@ from texrs._show import as_png
 from texrs._typing import Array, Labels, Path
 from texrs.elements._arrangement import Arrangement, describe_arrangement
 from texrs.elements._drawing import draw_plain, mark_points
-from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
+from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements
 from texrs.elements._known import as_element_labels, extend_points, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName, as_layout
 from texrs.errors import FileError, InvalidInput
@@ -57,7 +57,8 @@ class ElementAnalysis:
     layout : Layout
         Layout of the elements: disjoint, connected or jointed. Values that `Layout` accepts are converted.
     scores : ndarray of shape (n,), float64
-        Similarity of each element to the chosen element, -1 to 1.
+        Similarity of each element to the chosen element, -1 to 1. For elements of the element finder, the probability
+        that each is a whole element.
     directions : tuple of float
         Directions of the rows of points, in degrees in [0, 180), strongest first. Empty if they form no rows.
     wrap : tuple of bool
@@ -72,8 +73,8 @@ class ElementAnalysis:
     sets : Similarity, optional
         Result of `similarity`, if it was computed so that `save` stores it.
     known : ndarray of shape (height, width), int32, optional
-        Element of each pixel, from 1 in the order of the points, if it was given to `of_labels` or comes from certain
-        cells. Higher numbers than the number of points are elements that the border cuts.
+        Element of each pixel, from 1 in the order of the points, if it was given to `of_labels` or comes from the
+        element finder. Higher numbers than the number of points are elements that the border cuts.
 
     Examples
     --------
@@ -268,8 +269,9 @@ class ElementAnalysis:
     def _labelled(self) -> Labelled:
         if self.known is not None:
             points = extend_points(self.points, self.known, self.wrap)
-            scores = np.concatenate([self.scores, np.ones(len(points) - len(self.points))])
-            return Labelled(self.known, points, rate_closure(scores))
+            # Elements without a point are as certain as the others on average.
+            rest = np.full(len(points) - len(self.points), self.scores.mean())
+            return Labelled(self.known, points, np.concatenate([self.scores, rest]).clip(0, 1))
         found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
         found.labels.flags.writeable = False
         return found

@@ -46,8 +46,7 @@ class Separation:
     mask : (H, W) bool
         The foreground.
     made_by : str
-        Origin of the mask: "cut", "elements" (copies of the chosen element), "consensus" (common to all elements) or
-        "cells".
+        Origin of the mask: "cut", "elements" (copies of the chosen element) or "finder".
     """
 
     points: NDArray[np.float64]

@@ -24,7 +24,7 @@ from texrs.exemplar.contours import measure_moments, trace
 from texrs.exemplar.merging import join_parts, measure_usual_area
 from texrs.exemplar.shapes import Shapes, mark_outlines, widen
 
-__all__ = ["Cells", "find_cells", "take_cells"]
+__all__ = ["Cells", "fill_gaps", "find_cells", "take_cells"]
 
 WORKING = 22.0
 """Width of a cell at the working resolution, in pixels. Images with larger cells are reduced."""
@@ -62,6 +62,8 @@ SURE, FINE = 0.15, 0.3
 
 Weight of the full-resolution lightness relative to the joint strength.
 """
+GAP, MISSED = 0.15, 0.3
+"""Minimum half width, in cell widths, and minimum area, in usual areas, of a gap that contains a missed cell."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,6 +244,31 @@ def take_cells(labels: Labels, image: object) -> Cells:
     sure, polarity = np.ones(len(outlines)), _compare(light, relief)
     whole = _mark_whole(full)
     return Cells(full, outlines, moments.centre, moments.area, moments.angle, whole, sure, relief, 1.0, polarity)
+
+
+def fill_gaps(labels: Labels) -> Labels:
+    """Return known cells with further cells in wide gaps, where cells were missed.
+
+    Without them, the adjacent cells would share the gap, although no joint divides it.
+    """
+    from scipy.ndimage import distance_transform_edt, label
+
+    count = int(labels.max())
+    usual = float(np.median(np.bincount(labels.ravel())[1:])) if count else 0.0
+    reach = GAP * float(np.sqrt(usual))
+    depth = distance_transform_edt(labels == 0)
+    pieces, _ = label(depth > reach)
+    if not pieces.any():
+        return labels
+    away, at = distance_transform_edt(pieces == 0, return_indices=True)
+    gaps = np.where((labels == 0) & (away < reach), pieces[tuple(at)], 0)
+    large = np.bincount(gaps.ravel()) >= MISSED * usual
+    large[0] = False
+    # Leave joints of the usual width. The mean depth of a joint is about a quarter of its width, plus a half.
+    narrow = depth[(labels == 0) & ~large[gaps]]
+    gaps[depth <= (min(4 * float(narrow.mean()) - 2, 2 * reach) if len(narrow) else 0)] = 0
+    number = np.where(large, count + np.cumsum(large), 0)
+    return np.asarray(np.where(labels > 0, labels, number[gaps]), np.int32)
 
 
 def _project(lab: Floats, joints: Bools) -> Floats:

@@ -21,6 +21,7 @@ The result is a source map, so the image is looked up only once.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,10 +29,11 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, guidance
 from texrs._cache import Cache, content_hash
-from texrs._typing import Progress
-from texrs.elements import ElementAnalysis
+from texrs._typing import Labels, Progress
+from texrs.elements import ElementAnalysis, Layout
 from texrs.elements._instances import find_sure_cells
-from texrs.exemplar.cells import Cells
+from texrs.exemplar.cells import Cells, fill_gaps
+from texrs.exemplar.shapes import mark_outlines
 from texrs.exemplar.symmetry import find_mirrors
 from texrs.papers.splice.cells.cell_drawings import draw_cell_stages
 from texrs.papers.splice.cells.charts import Charts, draw_charts
@@ -54,14 +56,43 @@ HERE = 0.2
 
 Above it, the cell does not count as present.
 """
+OPEN = 6
+"""Power of the share of an outline in joints. With 6, a brick without a joint at one of its ends is not trusted."""
 
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 
 def find_entry_cells(entry: ElementAnalysis, watch: Progress | None = None) -> Cells | None:
-    """Return the cells of a connected texture, or None if they are not reliable enough, as in nets."""
-    found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch, known=entry.known)
+    """Return the cells of a connected texture or of a heap. None if they are not reliable enough, as in nets."""
+    # A heap has no background that could be seen between moved elements.
+    layout = Layout.JOINTED if is_heap(entry) else entry.layout
+    if entry.known is None or entry.report.get("mask") != "finder":
+        found = find_sure_cells(entry.image, entry.mask, entry.box, layout, watch, known=entry.known)
+    else:
+        found = find_sure_cells(entry.image, entry.mask, entry.box, layout, watch, known=fill_gaps(entry.known))
+        found = None if found is None else replace(found, certain=_rate_joints(found.labels, entry.known))
     return found if found is not None and len(list_usable(found)) >= FEWEST else None
+
+
+def _rate_joints(cells: Labels, known: Labels) -> NDArray[np.float64]:
+    """Return the certainty of each cell, 0 to 1: the share of its outline in joints, relative to the usual share.
+
+    Cells that share an outline without a joint can be parts of one cell. Cells in gaps are not certain.
+    """
+    from scipy.ndimage import minimum_filter
+
+    edge = mark_outlines(cells)
+    joint = edge & (minimum_filter(known, 3) == 0)
+    length, closed = (np.bincount(cells[where], minlength=int(cells.max()) + 1)[1:] for where in (edge, joint))
+    share = closed / np.maximum(length, 1)
+    share = np.minimum(share / max(float(np.median(share)), 1e-6), 1.0) if share.any() else np.ones(len(share))
+    share[int(known.max()) :] = 0
+    return np.asarray(share**OPEN)
+
+
+def is_heap(entry: ElementAnalysis) -> bool:
+    """Return True if elements are known to form a heap."""
+    return entry.known is not None and entry.report.get("found") == "heap"
 
 
 def splice_cells(
@@ -149,7 +180,7 @@ def _take_targets(
     b: ElementAnalysis, size: tuple[int, int], unit: float, scale: float | None, seed: int
 ) -> Tessellation:
     """Return the target cells from a cache, because one layout often serves several textures of one size."""
-    parts = np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, b.known
+    parts = np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, b.known, is_heap(b)
     key = content_hash(*parts, size, unit, scale, seed)
 
     def make() -> Tessellation:
