@@ -148,3 +148,19 @@ def test_elements_must_be_left(found: ElementAnalysis) -> None:
     drop: Callable[[int], dict[str, object]] = lambda n: {"op": "drop", "elements": list(range(n))}  # noqa: E731
     with pytest.raises(InvalidInput, match="must leave at least 3 elements, left 2"):
         correct(found, [drop(len(found.points) - 2)])
+
+
+def test_known_elements_stay_known_until_one_is_added() -> None:
+    image = samples.load("beans", size=(128, 128)).image
+    heap = elements.analyse(image)
+    fewer = elements.correct(heap, {"op": "drop", "elements": [2, 0]})
+    assert heap.known is not None
+    assert fewer.known is not None
+    assert fewer.labels.max() == heap.labels.max() - 2
+    assert not fewer.mask[(heap.labels == 1) | (heap.labels == 3)].any()
+    np.testing.assert_array_equal(fewer.labels == 1, heap.labels == 2)
+    np.testing.assert_array_equal(fewer.labels == 2, heap.labels == 4)
+    net = elements.correct(heap, {"op": "layout", "layout": "connected"})
+    np.testing.assert_array_equal(net.mask, ~heap.mask)
+    np.testing.assert_array_equal(net.labels, heap.labels)
+    assert elements.correct(heap, {"op": "add", "points": [[2.0, 2.0]]}).known is None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_instance, as_int
-from texrs._typing import Bools
+from texrs._typing import Bools, Labels
 from texrs.elements._arguments import as_points, find_contradiction
 from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
@@ -58,8 +58,8 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
     -------
     ElementAnalysis
         The corrected analysis. Its report contains all steps under ``"corrections"``, starting with the steps of
-        earlier corrections. Given labels (`ElementAnalysis.of_labels`) are dropped by the first step. After that, mask
-        and points define the elements.
+        earlier corrections. Known labels (`ElementAnalysis.known`) are dropped if a step adds an element or paints on the
+        mask. After that, mask and points define the elements.
 
     Raises
     ------
@@ -86,7 +86,8 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
             raise InvalidInput(f"corrections: step {number}, {step['op']}: {error}") from None
     if len(entry.points) < FEWEST:
         raise InvalidInput(f"corrections: must leave at least {FEWEST} elements, left {len(entry.points)}")
-    trouble = find_contradiction(entry.mask, entry.layout, entry.wrap) if known else ""
+    # Known elements may touch each other.
+    trouble = find_contradiction(entry.mask, entry.layout, entry.wrap) if known and entry.known is None else ""
     report = {
         **entry.report,
         "corrections": [*entry.report.get("corrections", []), *known],
@@ -94,7 +95,7 @@ def correct(entry: ElementAnalysis, steps: object) -> ElementAnalysis:
         "spacing": spacing(entry.points),
         "warnings": [trouble] if trouble else [],
     }
-    return replace(entry, report=report, directions=directions(entry.points), known=None) if known else entry
+    return replace(entry, report=report, directions=directions(entry.points)) if known else entry
 
 
 def read_steps(steps: object) -> list[dict[str, Any]]:
@@ -130,14 +131,24 @@ def _drop(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     listed = step["elements"] if isinstance(step["elements"], list) else [step["elements"]]
     gone = [as_int(n, "elements", 0, len(entry.points) - 1) for n in listed]
     kept = np.setdiff1d(np.arange(len(entry.points)), gone)
-    mask = entry.mask
-    if entry.layout == Layout.DISJOINT:
+    mask, separate = entry.mask, entry.layout == Layout.DISJOINT
+    if entry.known is not None:
+        mask = mask & ~np.isin(entry.known, np.array(gone) + 1) if separate else mask
+        entry = replace(entry, known=_renumber(entry.known, gone))
+    elif separate:
         pieces = label_components(mask, entry.wrap)[0]
         owner = pieces[find_nearest_pixels(entry.points, mask.shape)]
         # Remove a component only if it does not contain another element.
         alone = np.setdiff1d(owner[gone], owner[kept])
         mask = mask & ~np.isin(pieces, alone[alone > 0])
     return _take(entry, kept, mask)
+
+
+def _renumber(known: Labels, gone: Sequence[int]) -> Labels:
+    """Return labels without some elements, given by their numbers from 0. The others keep their order."""
+    kept = np.ones(int(known.max()) + 1, bool)
+    kept[[0, *(n + 1 for n in gone)]] = False
+    return np.where(kept, np.cumsum(kept), 0).astype(np.int32)[known]
 
 
 def _add(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
@@ -153,7 +164,7 @@ def _add(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     angles = None if entry.angles is None else np.concatenate([entry.angles, 0 * ones])
     scales = None if entry.scales is None else np.concatenate([entry.scales, ones])
     scores = np.concatenate([entry.scores, ones])
-    return replace(entry, points=points, mask=mask, scores=scores, angles=angles, scales=scales)
+    return replace(entry, points=points, mask=mask, scores=scores, angles=angles, scales=scales, known=None)
 
 
 def _move(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
@@ -167,7 +178,11 @@ def _move(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
 
 
 def _name_layout(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
-    return replace(entry, layout=Layout(step["layout"]))
+    layout = Layout(step["layout"])
+    # The mask of known meshes is the net between them.
+    turned = entry.known is not None and (layout == Layout.CONNECTED) != (entry.layout == Layout.CONNECTED)
+    report = {key: value for key, value in entry.report.items() if key != "found"}
+    return replace(entry, layout=layout, mask=~entry.mask if turned else entry.mask, report=report)
 
 
 def _dab(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
@@ -179,7 +194,7 @@ def _dab(entry: ElementAnalysis, step: Mapping[str, Any]) -> ElementAnalysis:
     mask = entry.mask | marked if step["op"] == "foreground" else entry.mask & ~marked
     if mask.all() or not mask.any():
         raise InvalidInput(f"leaves {'only' if mask.all() else 'no'} foreground")
-    return replace(entry, mask=mask)
+    return replace(entry, mask=mask, known=None)
 
 
 def _take(entry: ElementAnalysis, kept: NDArray[np.intp], mask: Bools) -> ElementAnalysis:
