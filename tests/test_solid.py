@@ -367,7 +367,7 @@ def test_progress_is_reported_and_raising_stops_at_each_stage():
     reported = []
     for quality in ("preserve", "fast"):
         texrs.solid(STRIPES, 20, quality=quality, progress=lambda stage, share: reported.append((stage, share)))
-    # The analysis of the exemplar is only reported if it takes long.
+    # The analysis of the exemplar is only reported if it takes a long time.
     stages = [stage for stage in dict.fromkeys(stage for stage, _ in reported) if stage != "exemplar"]
     assert stages == ["patches", "blocks", "level 1 of 2", "level 2 of 2"]
     for name in stages:

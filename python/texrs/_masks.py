@@ -34,7 +34,10 @@ JPEG at quality 20 changes black and white by up to 0.46.
 GREY, LEAST_GREY = 1 / 16, 0.01
 """Minimum brightness of grey pixels (1 is white), and minimum fraction of unmarked grey pixels to report."""
 TWO = 0.1
-"""Maximum fraction of non-zero pixels between the two values of a mask, at smooth edges or from JPEG noise."""
+"""Maximum fraction of the non-zero pixels of a mask that have intermediate values.
+
+Smooth edges and JPEG noise cause such values.
+"""
 PLAIN = 0.25
 """Minimum fraction of the opaque pixels of a layer with the same brightness.
 

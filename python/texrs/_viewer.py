@@ -90,7 +90,7 @@ def as_page(volume: Array) -> str:
 
     """
     sides = volume.shape[:3]
-    # Divide each side by the cube root of 2, which halves the number of voxels.
+    # In each attempt, divide each side by the cube root of 2, which halves the number of voxels.
     for attempt in range(_STEPS):
         least = 2 ** (attempt / 3)
         step = tuple(max(1, math.floor(least * max(1.0, n / 128))) for n in sides)

@@ -121,20 +121,22 @@ GROUNDS = replace(
     metavar=f"FILE|{FOUND}",
     words=(FOUND,),
     read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
-    note=f"{WORDS} Repeat the option for several planes, with {FOUND} where texrs must find the pixels.",
+    note=f"{WORDS} For several planes, repeat the option. Give '{FOUND}' for each plane whose pixels texrs must find.",
     many=True,
 )
 QUOTED = "Four points in quotes, such as '20,20 104,24 110,100 14,112'."
 CORNERS = Kind(
     "X,Y ...",
     lambda texts, about: [None if text == FOUND else parse_corners(text, about) for text in texts],
-    f"{QUOTED} For several planes, repeat the option in the order of --ground, with {FOUND} where texrs must find the plane.",
+    f"{QUOTED} For several planes, repeat the option in the order of --ground. "
+    f"Give '{FOUND}' for each plane that texrs must find.",
     many=True,
 )
 EACH = Kind(
     "NUMBER",
     parse_each,
-    f"For several planes, repeat the option in the order of --ground, with {FOUND} where texrs must find the value.",
+    "For several planes, repeat the option in the order of --ground. "
+    f"Give '{FOUND}' for each value that texrs must find.",
     many=True,
 )
 """Kind of a parameter with one value for each plane of a photograph."""
@@ -210,7 +212,7 @@ KINDS = {
     "field": Kind(
         "WORDS|FILE",
         read_field,
-        "For example circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
+        "Give a text, such as circular:axis=z,centre=16x24x0 (x first) or zigzag:period=64, or a file of frames or directions.",
         file=True,
     ),
     "spacing": Kind(
@@ -229,7 +231,7 @@ KINDS = {
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
     "background": Kind("X,Y", parse_places, "The option may be repeated.", many=True),
-    "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X,Y is the centre of the box."),
+    "box": Kind("X,Y,WIDTH,HEIGHT", parse_box, "X and Y are counted from the upper left corner of the image."),
     "points": Kind(
         "POINTS.csv", read_points, "Each line is x,y. A first line row,column states the other order.", file=True
     ),

@@ -95,7 +95,7 @@ def tiles_command(
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
     if windowed and not parts:
-        # Check the size before the tiles are cut, which takes long.
+        # Check the size before the tiles are cut, which takes a long time.
         as_size(sides, "--size", way=BEYOND)
     stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
     values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)

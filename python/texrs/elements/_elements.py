@@ -483,7 +483,7 @@ def load(path: Path) -> ElementAnalysis:
         shapes |= {"known": size} if "known" in parts else {}
         for name, shape in shapes.items():
             if parts[name].shape != shape:
-                raise InvalidInput(f"{name} of shape {parts[name].shape}")
+                raise InvalidInput(f"{name} must have shape {shape}, got {parts[name].shape}")
         if parts["mask"].dtype != np.bool_ or not np.isfinite(parts["points"]).all():
             raise InvalidInput("mask or points")
         # The similarity sets are stored only if they were computed.

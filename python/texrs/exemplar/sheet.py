@@ -271,7 +271,10 @@ class Flattened(Sheet):
         return self.resolution / scale
 
     def side(self, target: Floats) -> float:
-        """Return the side of a patch in samples, as a share of the sheet's side. Patches bend with the map."""
+        """Return the side of a patch in samples, as a share of the sheet's side.
+
+        The side does not depend on ``target``, because patches are warped to follow the scale map.
+        """
         return FLAT * float(np.sqrt(np.count_nonzero(self.free)))
 
     def frames(

@@ -135,7 +135,7 @@ def _as_number(value: object) -> float:
     try:
         return float(value)  # type: ignore[arg-type]
     except OverflowError:
-        raise InvalidInput("mask: must be a number that fits into a 64-bit float") from None
+        raise InvalidInput("mask: a number must be within the range of a 64-bit float") from None
 
 
 def _find_nodata(image: object) -> tuple[str, float | None]:

@@ -56,7 +56,8 @@ class TexturedMesh:
         Indices of the three vertices of each face.
     maps : dict of str to array
         Sampled maps, in the exemplar's dtype: (N[, C]) at the vertices, or (size, size[, C]) over the atlas. Several
-        texture sets have (sets, size, size[, C]). A texture of an array has one map, "image".
+        texture sets have (sets, size, size[, C]). If the texture was made from an array, the
+        only map is "image".
     uv : (N, 2) float64, optional
         Position of each vertex in the atlas, from the lower left. None if vertices have colours.
     roles : dict of str to Role

@@ -263,7 +263,7 @@ def evaluate(surface: Reals, places: tuple[Array, Array], size: tuple[int, int])
 
 
 def bends(plane: Plane, voices: list[Reals]) -> bool:
-    """Return True if the patterns of all bands show the same bend of the surface off a plane."""
+    """Return True if the patterns of all bands show that the surface is curved in the same way."""
     if len(voices) < 2:
         return False
     places = list_places(plane.shape, np.ones(plane.shape, np.bool_))

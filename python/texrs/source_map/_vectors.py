@@ -103,7 +103,7 @@ def turn_vectors(
     signed : bool
         If True, values are the components. Otherwise a component v is stored as (1 + v) / 2.
     bare : bool
-        If True, only x and y of normals are stored, in an image. Their z is computed, and other channels do not
+        If True, only x and y of the normals are stored (images only). Their z is computed, and other channels do not
         change.
     """
     # Decode the stored values to vectors.

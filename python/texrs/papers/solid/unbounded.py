@@ -141,7 +141,10 @@ class Texture(Endless):
         return content_hash(*said).hex()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the exemplar's pixels and the options. `Exemplar` lists the data that are computed again."""
+        """Pickle the exemplar's pixels and the options.
+
+        Other data are computed again after unpickling, as described in `Exemplar`.
+        """
         spacing, limits = self._spacing, (self._cache_bytes, self._memory_limit)
         options = (self._field, self._seed, self._quality, self._how, spacing, *limits)
         return _restore, (type(self), self._material or self._exemplar, options, self.key)

@@ -30,7 +30,8 @@ use crate::foundation::par;
 
 /// Number of points in a task.
 const CHUNK: usize = 1024;
-/// Length of shortened vectors, which fill one register. They are used if the leading components are sufficient.
+/// Length of shortened vectors, which fill one register. They are used if the caller requests only this
+/// many components.
 pub const FEW: usize = 8;
 /// Maximum number of samples in a similarity set.
 pub const LARGEST: usize = 16;

@@ -26,8 +26,8 @@ use crate::kernels::seam::maxflow::Solver;
 /// Pairs of a number of points and a side of blocks. If a cut is applied, windows with more points are first cut
 /// between blocks of this side.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
-/// The same limits for cuts that are only compared. For images under a field, larger blocks would reduce the quality
-/// too much for the time that they save.
+/// The same limits for cuts that are only compared. For images that follow a field, larger blocks would reduce the
+/// quality too much for the time that they save.
 const JUDGED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 
 /// A patch that is proposed for a window, at given exemplar coordinates.

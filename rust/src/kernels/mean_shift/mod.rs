@@ -160,8 +160,8 @@ wide_fn! {
     }
 }
 
-/// Moves the pixels of a row to their modes. `window` selects the samples around a position whose squared distance to
-/// the given colour is within the limit, and replaces the colour by their sum.
+/// Moves the pixels of a row to their modes. Around a position, `window` selects the samples whose squared colour
+/// difference from the given colour is within the limit. It replaces the colour by their sum.
 #[inline(always)]
 fn climb(
     planes: &Planes,

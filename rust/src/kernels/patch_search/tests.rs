@@ -126,7 +126,7 @@ fn half_the_resolution_finds_what_is_there() {
                     .unwrap()
             })
             .into();
-        // The result is the same for any number of threads, and finds the patch.
+        // The result is the same for any number of threads, and its best match is the patch itself.
         assert!(by_pool.iter().all(|found| *found == by_pool[0]));
         let best = by_pool[0][0];
         assert_eq!(

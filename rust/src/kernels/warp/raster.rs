@@ -189,8 +189,8 @@ impl Band<'_> {
     }
 }
 
-/// Returns the integers in [low, high], minus `first`, that are below `count`. Only casts are used,
-/// because rounding functions would be calls.
+/// Returns the integers in [low, high], minus `first`, that are below `count`. Rounding is done
+/// by casts, because the compiler would call library functions for it otherwise.
 #[inline(always)]
 fn pixels(low: f64, high: f64, first: usize, count: usize) -> std::ops::Range<usize> {
     let (low, high) = (low - first as f64, high - first as f64);

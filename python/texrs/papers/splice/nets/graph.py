@@ -52,8 +52,8 @@ def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floa
     """Return four features (rows, columns, 4) that describe each pixel's place in a net.
 
     The first two features are the distances to the nearest knot and the nearest line, in half spacings. The other two
-    are the cosine and sine of twice that line's angle, because a line has no forward end. Their weight decreases with
-    the distance from the line.
+    are the cosine and sine of twice that line's angle. The angle is doubled because opposite directions are the same
+    line. The weight of these features decreases with the distance from the line.
     """
     from scipy.spatial import cKDTree
 

@@ -61,7 +61,7 @@ impl Case {
     }
 }
 
-/// Costs with many ties, including zeros and high walls.
+/// Generates costs with many ties, including zeros and high walls.
 fn costs(n: usize) -> impl Strategy<Value = Vec<i32>> {
     (0i32..40).prop_flat_map(move |most| {
         let cost = prop_oneof![6 => 0..=most, 1 => Just(0), 1 => Just(most * 20)];
@@ -69,7 +69,7 @@ fn costs(n: usize) -> impl Strategy<Value = Vec<i32>> {
     })
 }
 
-/// A core made by a random walk. Outside pixels are random or along the border.
+/// Generates cases whose inside pixels are drawn by a random walk. Outside pixels are random or along the border.
 fn cases(longest: usize) -> impl Strategy<Value = Case> {
     (1..=longest, 1..=longest).prop_flat_map(|(rows, columns)| {
         let n = rows * columns;
