@@ -35,7 +35,7 @@ def rate(found: FoundElements, truth: NDArray[np.int32]) -> tuple[float, float]:
     [
         ("dots", 0.9, "separate"),
         ("leaves_and_flowers", 0.86, "separate"),
-        ("pebbles", 0.9, "separate"),
+        ("pebbles", 0.9, "separate heap"),
         ("scales", 0.9, "heap"),
         ("net", 0.92, "net"),
         ("bricks", 0.85, "jointed"),
@@ -50,7 +50,7 @@ def test_generated_elements_are_found(name: str, least: float, layout: str) -> N
     f, iou = rate(found, sample.labels)
     assert f >= least
     assert iou >= 0.73
-    assert found.layout == layout
+    assert found.layout in layout.split()
 
 
 def test_textures_without_elements_have_no_layout() -> None:
@@ -148,3 +148,22 @@ def test_the_upper_one_of_two_discs_is_known() -> None:
     right = [overlap.above > overlap.below for overlap in find_overlaps(labels) if overlap.confidence > 0.75]
     assert len(right) > 20
     assert np.mean(right) > 0.9
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.6])
+def test_other_sizes_of_one_image_give_similar_elements(factor: float) -> None:
+    from PIL import Image
+
+    sample = samples.leaves_and_flowers((256, 256))
+    assert sample.labels is not None
+    size = (round(256 * factor), round(256 * factor))
+    found = find_elements(Image.fromarray(sample.image).resize(size, Image.Resampling.LANCZOS))
+    f, _ = rate(found, np.array(Image.fromarray(sample.labels).resize(size, Image.Resampling.NEAREST)))
+    assert f >= 0.8
+
+
+def test_elements_of_clear_textures_are_surer() -> None:
+    clear, vague = (find_elements(image.image) for image in (samples.net((192, 192)), samples.bark((192, 192))))
+    means = [np.mean([element.confidence for element in found.elements]) for found in (clear, vague)]
+    assert means[0] > 0.8
+    assert means[0] > means[1] + 0.2

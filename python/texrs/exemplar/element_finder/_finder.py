@@ -23,8 +23,12 @@ LEAST = 8
 """Length of the shorter side of the reduced image below which nothing is searched for, in pixels."""
 EMPTY = 0.9
 """Probability of the layout "none" if no candidates exist."""
-RIGHT = 0.43, 0.12
-"""Quality for a 50 % probability that an element is right, and the spread around it. Fitted on 20 images."""
+RIGHT = 0.16, 5.0, 2.79
+"""Weights of a constant, the quality and the logarithm of the value of the choice in the log odds of an element.
+
+A logistic regression on elements of 156 images. Fitted without one half of the drawn images, the mean difference between
+stated probability and frequency is 0.02 to 0.04 on that half.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +216,8 @@ def measure_elements(labels: Labels, choice: Choice, overlaps: tuple[Overlap, ..
     for overlap in overlaps:
         if overlap.confidence > 0.75:
             above.setdefault(overlap.below, []).append(overlap.above)
-    sure = 1 / (1 + np.exp(-(choice.quality - RIGHT[0]) / RIGHT[1]))
+    odds = RIGHT[0] + RIGHT[1] * choice.quality + RIGHT[2] * np.log(max(choice.value, 0.02))
+    sure = 1 / (1 + np.exp(-odds))
     return tuple(
         Element(
             (float(rows[i]), float(columns[i])),

@@ -15,19 +15,22 @@ Arrangement: TypeAlias = Literal["separate", "heap", "jointed", "net", "none"]
 
 LAYOUTS: tuple[Arrangement, ...] = ("separate", "heap", "jointed", "net", "none")
 WEIGHTS = {
-    "constant": (-5.4, -3.52, 12.3, 5.67, -9.05),
-    "contact": (-3.99, 3.56, -0.96, 1.1, 0.28),
-    "width": (6.56, -0.91, -4.08, -0.74, -0.83),
-    "value": (1.27, -1.15, 1.65, 1.46, -3.23),
-    "darker_rim": (0.32, 2.53, 0.91, -2.43, -1.33),
-    "rectangular": (-13.33, -12.84, 32.89, 0.76, -7.47),
-    "contrast": (4.37, 4.29, -5.26, -2.23, -1.16),
-    "elongation": (0.04, -2.45, 1.3, -1.84, 2.95),
-    "lighter": (0.27, 1.59, -1.77, 0.14, -0.24),
+    "constant": (3.11, -2.24, 0.56, 12.87, -14.31),
+    "contact": (-3.66, 3.73, 1.92, -1.42, -0.56),
+    "width": (4.92, -1.68, -2.38, -0.32, -0.53),
+    "value": (1.23, -1.28, 4.42, 0.42, -4.79),
+    "darker_rim": (0.03, 0.15, 0.87, -1.24, 0.19),
+    "rectangular": (-16.42, -12.22, 21.53, 6.99, 0.12),
+    "contrast": (2.2, 2.64, -3.27, -0.72, -0.86),
+    "elongation": (-1.12, -2.46, 1.99, -1.98, 3.57),
+    "lighter": (0.67, 0.38, -0.8, 0.37, -0.62),
+    "inner": (-4.59, -4.31, 4.4, 0.21, 4.29),
+    "count": (-0.44, 0.36, 1.19, -1.22, 0.11),
+    "dark_lines": (-0.46, 2.1, -1.41, -0.55, 0.31),
 }
-"""Weights of the cues for each layout: a logistic regression on 38 textures.
+"""Weights of the cues for each layout: a logistic regression on 168 images of 54 kinds, photographs and generated ones.
 
-With each texture left out in turn, 75 % of the layouts are right; the mean probability of the best layout is 0.80.
+With each kind left out in turn, 82 % of the layouts of photographs are right. Their mean probability is 0.81.
 """
 
 
@@ -42,8 +45,9 @@ def read_layout(choice: Choice, contours: Contours) -> dict[Arrangement, float]:
 def measure_cues(choice: Choice, contours: Contours) -> dict[str, float]:
     """Return the cues of the layout.
 
-    Contact of the elements, width of the gaps, value of the choice, lightness in and around the gaps, and shape and
-    contrast of the elements.
+    - contact of the elements, width of the gaps, lightness in and around the gaps
+    - shape, contrast and number of the elements, strength of contours inside
+    - value of the choice, and whether dark lines are contours
     """
     labels, f, light = choice.labels, choice.chosen.features, contours.lab[..., 0]
     background, inner = labels == 0, labels > 0
@@ -69,6 +73,9 @@ def measure_cues(choice: Choice, contours: Contours) -> dict[str, float]:
         "contrast": mean("contrast"),
         "elongation": mean("elongation"),
         "lighter": float(np.tanh(lighter / 15)),
+        "inner": mean("inner") / choice.level,
+        "count": float(np.log(len(f["area"]))),
+        "dark_lines": float(choice.lines == "dark"),
     }
 
 

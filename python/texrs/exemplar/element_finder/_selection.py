@@ -33,6 +33,24 @@ LARGER = 0.1
 """Power of the usual area in the value of a choice: of equal choices the one of larger elements wins."""
 CONVEX = 6
 """Power of the convexity in the value of a choice. On 30 images, 6 picks the best reading of lines most often."""
+VALUE = {
+    "worth": 3.55,
+    "solid": 21.7,
+    "ellipse": 59.3,
+    "remainder": -6.43,
+    "ground": 4.27,
+    "leaves": 0.72,
+    "size": -0.21,
+}
+"""Weights of the measures of a choice, see `compare_choices`.
+
+They maximise the expected product of F and IoU of a choice with a probability proportional to exp(value).
+They were fitted on 111 images: drawn ones, the same at other sizes and in other colours, and generated ones.
+With each kind of texture left out in turn, the mean F is 0.848.
+It is 0.813 with the worth and two powers of the area and the convexity.
+"""
+USUAL = -3.32
+"""Logarithm of the best median area of the elements, as a share of the image: about 5 elements along each side."""
 STARTS = 6
 """Number of usual sizes to start the consensus with. The mean F of drawn images is 0.81 with 1, 0.90 with 6."""
 OTHERS = 48
@@ -56,7 +74,9 @@ class Choice:
     quality : float64 array, (N,)
         Quality of each element.
     value : float
-        Value of the choice.
+        Mean quality of the elements above the floor, more if they are convex and large.
+    score : float
+        Value of the choice in comparison with other choices of the same image.
     lines : {"dark", "none", "light"}
         Lines that count as contours.
     level : float
@@ -70,6 +90,7 @@ class Choice:
     chosen: Candidates
     quality: Values
     value: float
+    score: float
     lines: str
     level: float
     strength: Floats
@@ -79,7 +100,7 @@ def choose(contours: Contours) -> Choice | None:
     """Return the best choice over all readings of lines, or None without elements."""
     for fewest in FEWEST:
         found = [choose_reading(contours, lines, fewest) for lines in ("none", "dark", "light")]
-        best = max((one for one in found if one is not None), key=lambda one: one.value, default=None)
+        best = max((one for one in found if one is not None), key=lambda one: one.score, default=None)
         if best is not None:
             return best
     return None
@@ -123,15 +144,16 @@ def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None
             if again.sum() < fewest:
                 break
             chosen = again
-            value = measure_value(candidates, quality, chosen)
-            if best is None or value > best[0]:
-                best = (value, chosen, quality)
+            score = compare_choices(candidates, quality, chosen, leaves, level)
+            if best is None or score > best[0]:
+                best = (score, chosen, quality)
     if best is None:
         return None
-    value, chosen, quality = best
+    score, chosen, quality = best
     picked = np.flatnonzero(chosen)
     elements = candidates.pick(picked)
-    return Choice(elements.paint(leaves), elements, quality[picked], value, lines, level, strength)
+    value = measure_value(candidates, quality, chosen)
+    return Choice(elements.paint(leaves), elements, quality[picked], value, score, lines, level, strength)
 
 
 def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
@@ -187,6 +209,35 @@ def measure_value(candidates: Candidates, quality: Values, chosen: NDArray[np.bo
     mean = float((area * (quality[chosen] - FLOOR)).sum() / area.sum())
     convex = float((area * candidates.features["solid"][chosen]).sum() / area.sum())
     return float(mean * convex**CONVEX * np.median(area) ** LARGER)
+
+
+def compare_choices(
+    candidates: Candidates, quality: Values, chosen: NDArray[np.bool_], leaves: Leaves, level: float
+) -> float:
+    """Return the value of a choice in comparison with other choices of the same image."""
+    f = candidates.features
+    area = f["area"][chosen]
+    worth, solid, ellipse = (
+        float((area * each[chosen]).sum() / area.sum()) for each in (quality - FLOOR, f["solid"], f["ellipse"])
+    )
+    inside = np.zeros(leaves.count, bool)
+    inside[candidates.pick(np.flatnonzero(chosen)).members] = True
+    # Clear contours between two parts of the background are a sign that elements are missing.
+    free = ~inside[leaves.pairs].any(axis=1)
+    remainder = leaves.arcs[free, 1].sum() / max(leaves.arcs[free, 0].sum(), 1.0) / level
+    words = leaves.values[:, 7:]
+    own, other = (part.sum(0) / max(part.sum(), 1.0) for part in (words[inside], words[~inside]))
+    usual = float(np.median(area))
+    measures = {
+        "worth": np.log(max(worth, 0.02)),
+        "solid": np.log(solid),
+        "ellipse": ellipse,
+        "remainder": remainder,
+        "ground": 0.5 * ((own - other) ** 2 / (own + other + 1e-6)).sum(),
+        "leaves": np.log(usual / np.median(leaves.values[:, 0])),
+        "size": (np.log(usual / leaves.labels.size) - USUAL) ** 2,
+    }
+    return float(sum(weight * measures[name] for name, weight in VALUE.items()))
 
 
 def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality: Values, leaves: Leaves) -> Values:
