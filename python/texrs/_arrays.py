@@ -104,8 +104,8 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     Raises
     ------
     InvalidInput
-        The values are not numbers, not finite or masked. Or the image is too small, has the wrong number of axes, or
-        has its channels as the first axis.
+        The values are not numbers, not finite or masked. This error is also raised if the image is too small, has the
+        wrong number of axes, or has its channels as the first axis.
     FileError
         A path cannot be read.
     LimitExceeded

@@ -47,7 +47,8 @@ CHUNK, MANY = 2**16, 2**12
 OFF = "use --no-palette or another interpolation to change this"
 """End of each notice, which explains how to allow other colours."""
 _ASKED: ContextVar[bool | None] = ContextVar("palette", default=None)
-"""True: all images keep their colours. False: no image does. None: indexed images and images of few colours do."""
+"""True: all images keep their colours. False: no image keeps them. None: only indexed images and images of
+few colours keep them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +163,7 @@ def make_plain(source: SourceMap) -> SourceMap:
 
 
 def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
-    """Return a result whose maps are copied from the nearest pixels, if the colours of its materials are few."""
+    """Return a result whose maps are copied from the nearest pixels, if its materials have few colours."""
     asked, bases = _ASKED.get(), [m.base for m in materials]
     few = asked is not False and made.source_map.axes == 2 and all(has_few_colours(base) for base in bases)
     if not few and not asked:

@@ -63,7 +63,7 @@ def _tell(asked: Callable[[], object]) -> None:
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    """Return a function that a kernel calls with its completed share, or None without a progress function."""
+    """Return the function that a kernel calls with its completed share. None if ``progress`` is None."""
     if progress is None:
         return None
     progress(name, 0.0)  # Report the start, because short work can finish before its first report.

@@ -197,9 +197,9 @@ class _Traits:
     line : float
         Minimum gradient of a line.
     broken : float
-        Share of the pairs of neighbours with a line that breaks off.
+        Share of the pairs of neighbouring pixels where a line breaks off.
     lines : float
-        Share of the pairs of neighbours on a line.
+        Share of the pairs of neighbouring pixels that are on a line.
     salience : (h, w) float64
         Conspicuousness of each cell, 1 on average.
 

@@ -91,8 +91,8 @@ def rectify(
 
         Stages:
 
-        - ``flat``: All of the plane that is visible, flattened.
-        - ``sharp``: The part of it that is sharp enough.
+        - ``flat``: The visible part of the plane, flattened.
+        - ``sharp``: The part of the flattened plane that is sharp enough.
         - ``before_blending``: The result before seams are corrected.
 
         Report:

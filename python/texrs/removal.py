@@ -61,9 +61,10 @@ def remove(
         Mask of the object to remove and of its shadow. See `texrs.Mask` for how a mask is read, inverted, grown and
         feathered.
     view : PlaneView or Plane, or a sequence of them, optional
-        Position of the plane behind the object in the photograph, as far as it is known. The rest is found. If the
-        result is uncertain, or the plane is seen from the front, patches are copied without a change of scale. Several
-        planes, such as a floor and a wall, are filled separately. Only one of them may lack a ground.
+        Position of the plane behind the object in the photograph, as far as it is known. Other properties of the plane
+        are found. If the result is uncertain, or the plane is seen from the front, patches are copied without a change
+        of scale. Several planes, such as a floor and a wall, are filled separately. Only one of them may lack a
+        ground.
     margin : int, optional
         Growth of the mask on all sides in pixels, 0 to 64. Default: 1/150 of the shorter side.
     boundary_width : int, optional
@@ -118,8 +119,8 @@ def remove(
     Raises
     ------
     InvalidInput
-        If options are out of their ranges, or a mask or ground has another shape. Also if nothing is marked, no source
-        remains, or the plane is described twice.
+        If options are out of their ranges, or a mask or ground has another shape. This error is also raised if nothing
+        is marked, no source remains, or the plane is described twice.
 
     Warns
     -----

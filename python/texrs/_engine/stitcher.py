@@ -210,8 +210,9 @@ class Stitcher:
         weights : Weights
             Weights of the cost of a seam.
         repetition, continuation : float
-            Cost of source positions that are used more often than others, and of continuing exactly where a neighbour
-            ends, 0 to 100. For comparison, two unrelated positions differ by 2.
+            Costs, 0 to 100. ``repetition`` applies to source positions that are used more often than others.
+            ``continuation`` applies to patches that continue exactly where a neighbour ends in the exemplar. For
+            comparison, two unrelated positions differ by 2.
         seed : int
             Seed of the random choices.
         held : (points) bool, optional
@@ -374,7 +375,7 @@ class Pasting:
     seams : (h, w, 2) float32
         Cost of the seam from each pixel to the next one along each axis.
     mask, core : (h, w) bool
-        True for pixels that a patch can cover, and for pixels that it must cover.
+        ``mask`` is True for pixels that a patch can cover, and ``core`` for pixels that it must cover.
 
     """
 

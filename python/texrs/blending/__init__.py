@@ -219,7 +219,7 @@ def apply(
     finish: RenderOptions | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Render a map through a source map, with the same options as the image of the verb that created the source map.
+    """Render a map through a source map, with the options that the verb used for its image.
 
     Specify the type of the map here. `texrs.apply` infers it from the name of a file.
 

@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.source_map._vectors import stores_z
 
 STRIP = 2**22
-"""Maximum number of pixels that are solved at once. If corrections reach far, four times as many are solved at once."""
+"""Maximum number of pixels that are solved at once. It is four times as large if corrections reach far."""
 STEEPEST = 4.0
 """Maximum slope, 76 degrees. Steeper slopes are clipped."""
 FLATTEST = 0.2

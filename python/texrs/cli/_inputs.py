@@ -238,7 +238,7 @@ def _count_alike(texts: Sequence[str]) -> int:
 
 
 def list_known(source: Source) -> dict[str, str]:
-    """Return the values for words in braces.
+    """Return the values that replace words in braces, by word.
 
     ``{parent}`` is the folder of the input, ``{parent2}`` the folder above it.
     """

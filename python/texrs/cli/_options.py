@@ -315,7 +315,7 @@ def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]
 
 
 def _split_union(annotation: Any) -> tuple[Any, ...]:
-    """Return the types of a union. Another type is returned by itself."""
+    """Return the types of a union, or a tuple of the type itself if it is not a union."""
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 

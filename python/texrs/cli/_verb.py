@@ -194,7 +194,7 @@ class Verb:
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
     def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
-        """Return the material among the inputs whose maps the result also has, or None.
+        """Return the input material whose maps the result also has, or None.
 
         Inputs that only guide the result are ignored.
         """

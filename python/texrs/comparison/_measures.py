@@ -1,4 +1,4 @@
-"""Measures of images from their pixels. Less is better, and 0 is the value of the example itself."""
+"""Measures of images from their pixels. Smaller values are better, and the example itself has the value 0."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def find_echo(image: Array) -> float:
 
 
 def measure_border(example: Array, made: Array) -> float:
-    """Return the excess of the steps between opposite borders over the steps inside the example."""
+    """Return the ratio of the steps across the border to the steps inside the example, minus 1, at least 0."""
     ratios = []
     for axis in range(2):
         across = np.abs(made.take(0, axis).astype(float) - made.take(-1, axis)).mean()

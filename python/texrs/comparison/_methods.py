@@ -104,7 +104,7 @@ def run(*words: object) -> None:
 
 
 def run_embark(more: bool, program: str, asked: Request) -> Array:
-    """Let Embark's texture-synthesis generate a texture, or fill a hole, which is black in its mask."""
+    """Generate a texture with Embark's texture-synthesis, or fill a hole. The hole is black in the mask."""
     height, width = (asked.size, asked.size) if more else asked.picture.shape[:2]
     with tempfile.TemporaryDirectory() as folder:
         example, mask, out = (Path(folder, f"{n}.png") for n in ("example", "mask", "out"))

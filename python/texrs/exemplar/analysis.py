@@ -115,7 +115,7 @@ class Analysis:
 
 
 def count_levels(shape: Sequence[int], coarsest: int) -> int:
-    """Return the number of pyramid levels for which the coarsest level has at least a given side."""
+    """Return the maximum number of pyramid levels whose coarsest level has at least a given side."""
     return max(1, int(log2(max(1, min(shape) / coarsest))) + 1)
 
 

@@ -44,7 +44,7 @@ If the ratio is larger, the peak is part of a stripe and does not give a period.
 NEAR = 2
 """Search distance around the expected multiple of a period, in pixels."""
 OFTEN = 64
-"""Number of nearest peaks to which periods are fitted one by one.
+"""Number of nearest peaks to which periods are fitted peak by peak.
 
 Farther out, periods are fitted once per ring of peaks.
 """

@@ -44,7 +44,7 @@ class Shapes:
         return cls(np.bincount(labels.ravel(), minlength=len(reach)).astype(np.float64), reach)
 
     def join(self, one: int, other: int) -> None:
-        """Merge two labels. The first label becomes the union."""
+        """Merge two labels. The union has the first label."""
         self.area[one] += self.area[other]
         self.reach[one] = np.maximum(self.reach[one], self.reach[other])
 

@@ -53,9 +53,9 @@ FLAT, COPIED = 0.4, 0.3
 VARIES = 0.4
 """Maximum difference of log scales across a patch of a resized copy."""
 GOOD, FAIR = 0.03, 0.08
-"""Maximum residual of a scale map that fits a plane well, and of one that fits it fairly."""
+"""Maximum residual of a scale map that fits a plane well, and of a scale map that fits it fairly."""
 FORESHORTENED = 0.2
-"""Minimum increase of edge steepness with distance, if a plane fits fairly.
+"""Minimum increase of edge steepness with distance, if a plane fits only fairly (`FAIR`).
 
 The value is less than 1 because few edges are exactly across the slope.
 """

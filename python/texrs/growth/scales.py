@@ -50,7 +50,7 @@ class Scales:
     target : (rows, columns) float32, optional
         Requested scale of each pixel. None if scales are not restricted.
     strength : float
-        Factor on the weight of the scales, usually 1.
+        Factor that multiplies the weight of the scales, usually 1.
     held : Held, optional
         Fixed points, by their source samples in the atlas.
 
@@ -110,7 +110,7 @@ def grow_from_atlas(
     settings : Settings
         Settings of the engine.
     strength : float
-        Factor on the weight of the scales. Default: 1.
+        Factor that multiplies the weight of the scales. Default: 1.
     held : Held, optional
         Fixed points, by their source samples in the atlas.
     seed : int

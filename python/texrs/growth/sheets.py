@@ -88,7 +88,7 @@ def stitch_sheet(
     target : (rows, columns) float32
         Requested scale of each pixel.
     strength : float
-        Factor on the weight of the scales. Default: 1.
+        Factor that multiplies the weight of the scales. Default: 1.
     side : float, optional
         Side of a patch, in samples of the sheet. Default: chosen from the sheet's usable area.
     seed : int

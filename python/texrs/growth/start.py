@@ -31,7 +31,7 @@ MOST = {2: 256.0, 3: 64.0}
 OVERLAP = {2: 0.33, 3: 0.4}
 """Overlap of neighbouring patches, as a share of the patch side, by number of axes."""
 GUIDED = 0.4
-"""Factor on the patch side if a guide or values are given.
+"""Factor that multiplies the patch side if a guide or values are given.
 
 Patches are smaller because the exemplar's own trend continues within a patch.
 """
@@ -74,7 +74,7 @@ def from_patches(
         If True, patches bend with a field. Default: True if the exemplar's edges have a direction and its elements are
         not separate.
     larger : float
-        Factor on the usual side of the patches. Default: 1.
+        Factor that multiplies the usual side of the patches. Default: 1.
     plain : bool
         If True, elements do not change the costs of seams.
     """

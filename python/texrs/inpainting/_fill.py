@@ -58,7 +58,7 @@ def fill(
     plane : Plane, optional
         Plane that patches are copied from and pasted into.
     scales : sequence of (H, W) float32, optional
-        Size of the elements, used if no plane or too little of one is known.
+        Size of the elements. It is used if no plane is known, or only a small part of it.
     patch : int, optional
         Side of the patches, in pixels.
     mirrors : sequence of Flip

@@ -36,7 +36,7 @@ This takes half the time of all sides. Seams are 1 % more visible, measured in 7
 WIDEST = 0.3
 """Maximum side, as a share of the shorter side of the image."""
 CLEARLY = 0.97
-"""Maximum visibility of the seams of a smaller patch that is preferred, relative to the seams of the larger patch."""
+"""Maximum visibility of seams, relative to a larger patch, for which a smaller patch is preferred."""
 WITHIN = 1.3
 """Maximum side, relative to the side of a square as large as all holes.
 
@@ -223,7 +223,7 @@ def guide_together(pictures: Sequence[Array]) -> list[Floats]:
 
 
 def check_places(free: Bools, side: int) -> None:
-    """Refuse a patch size without any place to copy from."""
+    """Raise an error if no place is large enough for copying patches of this size."""
     if not mark_corners(free, side).any():
         fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
         hint = f"the largest size that fits is {fits}" if fits else "no other size fits; give an exemplar"

@@ -34,8 +34,8 @@ def mean_shift(
 
     Each pixel starts at its position and colour, and moves repeatedly to the mean of the pixels in a square window
     around it. Only pixels whose colour differs by at most ``range`` count (Comaniciu and Meer [1]_, flat kernels). The
-    result is close to ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. Unlike there, any number of channels is
-    supported, and the result does not depend on the number of threads or the processor.
+    result is close to ``cv2.pyrMeanShiftFiltering`` with ``maxLevel=0``. Unlike OpenCV, this function supports any
+    number of channels, and its result does not depend on the number of threads or the processor.
 
     Parameters
     ----------

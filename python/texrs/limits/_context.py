@@ -201,7 +201,7 @@ def find(name: str) -> int | None:
 
 
 def find_end() -> tuple[float, float] | None:
-    """Return when a call that begins now must end, and the seconds it was given, or None without a time limit."""
+    """Return the latest end of a call that begins now, and its number of seconds. None if it has no time limit."""
     now, block = time.monotonic(), _BLOCK.get().end
     ends = [(now + s, s) for s in (_PROCESS.seconds, _read("seconds")) if s is not None]
     return min(ends + ([] if block is None else [block]), default=None)

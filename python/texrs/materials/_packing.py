@@ -1,4 +1,4 @@
-"""Split packed maps, whose channels are different quantities, and combine quantities to packed maps."""
+"""Split packed maps, whose channels are different quantities, and combine quantities into packed maps."""
 
 from __future__ import annotations
 

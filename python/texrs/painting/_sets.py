@@ -51,7 +51,7 @@ class UnwrappedMesh(NamedTuple):
 
 
 def lay_flat(surface: Surface, side: int, padding: int, *, fresh: bool) -> UnwrappedMesh:
-    """Return a mesh with its texture sets: one, or one for each material, part and tile that would overlap.
+    """Return a mesh with its texture sets: several if the UVs of materials, parts or tiles would overlap, else one.
 
     Raises
     ------

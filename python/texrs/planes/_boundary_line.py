@@ -36,7 +36,7 @@ contrast falls.
 
 
 def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools | None:
-    """Return the larger side of the line across which the windows change abruptly, or None without an abrupt change.
+    """Return the larger side of the line where the windows change abruptly, or None if it does not exist.
 
     Each window has five facts (H, W, 5): the means of three colours and of two bands of squared detail. `reach` is the
     standard deviation of the windows in pixels.

@@ -37,7 +37,7 @@ RANGE, PLAIN = np.array([1.0, 1.0, 1.0, 4.0, 4.0]), -5.0
 LOOSE = 1.5
 """Maximum deviation within one ground, as a multiple of the minimum deviation."""
 POWER = 4
-"""Exponent of the mean of deviations. It is high so that one large deviation is enough."""
+"""Exponent of the mean of deviations. It is high, so that a large deviation of one fact dominates."""
 EVEN = 1.0
 """Weight of the penalty on changes across the image, relative to the fit. Positions are from -1 to 1."""
 FAR = 4.0
@@ -211,7 +211,7 @@ def list_starts(thin: Bools) -> list[Bools]:
 
 
 def measure_off(rest: NDArray[np.float64], spread: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return squared deviations in standard deviations, such that one large deviation of a fact is enough."""
+    """Return the squared deviation of each window from its facts, in standard deviations. A large one dominates."""
     return np.asarray((np.abs(rest / spread) ** POWER).mean(axis=-1) ** (2 / POWER), np.float64)
 
 

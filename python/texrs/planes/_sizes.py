@@ -51,13 +51,13 @@ APART, LEVEL = 0.6, 0.03
 The first limit is a share of the larger standard deviation of the two maps, the second is in natural logarithms.
 """
 BENT, MORE = 0.04, 0.8
-"""Maximum deviation from a plane that is good enough, and the same as a share of the variation of the plane.
+"""Maximum deviation from a plane, and the same limit as a share of the variation of the plane.
 
 Both are standard deviations, the first in natural logarithms. The share is needed because distant parts are blurred,
 so steep planes seem to bend.
 """
 ROUGH = 0.12
-"""Maximum standard deviation from a curved surface that is good enough, in natural logarithms."""
+"""Maximum standard deviation of sizes from a curved surface that fits, in natural logarithms."""
 UNEVEN = 0.6
 """Logarithm of the ratio between the ranges of size of two bands that lowers the confidence to 1 / e."""
 FEWEST = 24

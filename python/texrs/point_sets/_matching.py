@@ -67,8 +67,8 @@ def _assign(square: Points) -> NDArray[np.intp]:
 def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
     """Match many targets, considering only the nearest sources of each.
 
-    A matching is accepted if each target gets a source from the nearer half of the considered ones. A better matching
-    would move a target to a source that was not considered. This only pays if many other targets gain by it.
+    A matching is accepted if each target gets a source from the nearer half of the considered sources. A better
+    matching would move a target to a source that was not considered. This only pays if many other targets gain by it.
     Considering all pairs would need quadratic memory and cubic time.
     """
     from scipy.sparse import csr_array

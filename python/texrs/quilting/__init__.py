@@ -15,8 +15,8 @@ Departures from the paper, with their reasons:
   differences, averaged over 22 textures, and 0.8 % are above the 99th percentile. With plain differences in strips,
   these values are 1.32 and 2 %. The stitcher's cost for rarely adjacent colours gives the lowest value (0.94), but it
   fuses similar elements such as coins and olives.
-- If the texture has a lattice, a patch also has a cost for pixels that do not fit. A seam through plain background
-  would not show that a patch is out of step with the lattice.
+- If the texture has a lattice, all overlapping pixels that differ also add to the cost of a patch. A seam through
+  plain background would not show that the patch does not match the lattice.
 - A patch has a cost for samples that other patches already use, and for continuing exactly where a neighbour ends. The
   cost is added, because a factor on the match would be zero for an exact continuation, which would always win.
 - A texture with courses is only quilted along the courses. Its images are placed so that their joints coincide.

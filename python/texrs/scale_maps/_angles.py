@@ -25,9 +25,9 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
     image is (size - 1) / 2. The nearest and farthest corners depend on the tilt, for tilts of any angle.
 
     With ``fov``, the map is that of a pinhole camera: it is 1 in the middle, and its range grows with the angle of
-    view. The range is usually larger than without ``fov``. If the slant is 45 degrees, the nearest elements are 2x as
-    large as the farthest without ``fov``. They are 2.1x as large with an angle of view of 40 degrees, and 3.7x with 60
-    degrees. Pass the angle of view if it is known (`texrs.io.read_fov`).
+    view. The range is usually larger than without ``fov``. For a slant of 45 degrees, without ``fov``, the nearest
+    elements are 2x as large as the farthest elements. With an angle of view of 40 degrees they are 2.1x as large, and
+    with 60 degrees 3.7x. Pass the angle of view if it is known (`texrs.io.read_fov`).
 
     The scale is the width of elements across the slope. Elements are also foreshortened along the slope, so the square
     root of their area is the power 3/2 of the width.

@@ -28,14 +28,14 @@ class Tiling:
     ----------
     seam : (float or None, float or None)
         Boldness of the borders between the last and the first row, and between the last and the first column.
-        The value 1 means as bold as the boldest lines elsewhere in the image. None: fewer than 8 lines.
+        A border of 1 is as bold as the boldest lines elsewhere in the image. None: fewer than 8 lines.
     place : ((int, int) or None, (int, int) or None)
         Boldest part of each border: its first pixel along the border, and the first pixel after it.
     maps : mapping of str to Tiling
         Result for each map of a material. The other attributes are those of the map with the boldest border. Empty for
         an image.
     step : (float or None, float or None)
-        Boldness of the steps across seams of the source map: between rows, and between columns. The value 1 means as
+        Boldness of the steps across seams of the source map: between rows, and between columns. A step of 1 is as
         bold as the boldest lines elsewhere in the image. None: no source map, or no seam of a quarter of a side.
 
     Examples

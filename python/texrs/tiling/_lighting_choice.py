@@ -22,7 +22,7 @@ crops of evenly lit textures are recognised, and 128 of 134 unevenly lit crops.
 SHORT = 0.05
 """Maximum mean deviation of the length of vectors from 1 for a normal map."""
 STEP = 4
-"""Distance in pixels, along each axis, of the pixels that are tested for normals."""
+"""Spacing, in pixels along each axis, of the pixels that are tested for normals."""
 
 
 def name_image(image: Exemplar | Material) -> str:

@@ -28,7 +28,8 @@ Departures, with their reasons:
 - The result is a set of source coordinates. Colours are copied from there instead of averaged, so that they are not
   blurred.
 - A target can be a surface: another plane, normals, texture coordinates, or Jacobians (`targets`). Patches are bent to
-  the surface, so that elements are foreshortened like it. The sizes of elements on the surface replace S_o.
+  follow the surface, so that elements are foreshortened like the surface. The sizes of elements on the surface replace
+  S_o.
 - Frame fields can rotate the copied texture on its surface (`directions`). Section 6 of the paper leaves directions of
   elements to future work.
 - Instead of the histograms of Eq. 8, source places that were already copied often have a cost, as have overrepresented

@@ -21,7 +21,7 @@ Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
 """Default sizes of copies, relative to the exemplar, whose own size is the first."""
 PLENTY = 0.75
-"""Minimum number of exemplar samples per output pixel of similar scale, for which copies are not needed."""
+"""Number of exemplar samples per output pixel of similar scale that is sufficient, so that copies are not needed."""
 ALIKE = 0.1
 """Maximum natural logarithm of the ratio of two scales that count as equal."""
 

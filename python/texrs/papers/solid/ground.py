@@ -19,7 +19,7 @@ __all__ = ["Ground"]
 BENT = 0.7
 """Maximum difference of frames within a box, as the root mean square over the axes. Boxes above it are divided."""
 LEAST = 4
-"""Side, in voxels, below which boxes are not divided because of different frames."""
+"""Side, in voxels, up to which boxes are not divided, even if their frames differ."""
 
 Row = tuple[tuple[int, ...], tuple[int, ...], NDArray[np.int64]]
 """Centre of a box, its source coordinates in fixed point, and the Jacobian there."""

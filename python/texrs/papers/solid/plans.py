@@ -32,7 +32,7 @@ class Plan:
     """A method of cutting and stitching patches."""
 
     larger: float = 1.0
-    """Factor on the usual side of the patches."""
+    """Factor that multiplies the usual side of the patches."""
     plain: bool = False
     """If True, elements do not change the costs of seams."""
 
@@ -50,7 +50,7 @@ class Plan:
 
 
 LARGE = 1.25
-"""Factor on the patch side in the "large" methods.
+"""Factor that multiplies the patch side in the "large" methods.
 
 Patches 1.5 times as large copy more than a fifth of the result in one piece.
 """

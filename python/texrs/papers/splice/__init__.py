@@ -25,8 +25,8 @@ Departures from the paper, with their reasons:
   Without this, a third of the output would be empty, and elements would be missing at its border.
 
 - There are more elements than targets, because the printed algorithm needs point sets of equal size. Elements without
-  a target are erased. They shrink and the background around them closes, because a fifth of the output would be a hole
-  otherwise.
+  a target are erased. They shrink, and the background around them closes. Without this, a fifth of the output would be
+  a hole.
 
 - For connected figures, the layout is shifted so that their elements move least. Displacements of neighbours differ by
   at most a share of an element. Otherwise courses are torn if the layout does not have courses.

@@ -45,7 +45,7 @@ def draft_pixels(a: ElementAnalysis, match: Match, warp: BackwardWarp, *, whole:
 def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> tuple[Labels, Bools]:
     """Return the target of each element pixel, counted from 1, and True for pixels that the mesh stretches.
 
-    Stretched outlines do not belong to elements, whose pixels are exactly at the element's target.
+    Stretched pixels have no target, because the pixels of an element must be exactly at its target.
     """
     extension, known = match.extension, warp.known
     goal = np.zeros(len(extension.points) + 1, np.uint32)

@@ -82,8 +82,8 @@ def remember(
     count : int
         Maximum number of cached results, or their maximum total ``size``.
     seen : bool
-        If True, the key also contains the image, and the box of an element, for functions that read them. Default:
-        False.
+        If True, the key also contains the image and the box of an element. This is required for functions that read
+        them. Default: False.
     size : callable, optional
         Function that returns the size of a result. Default: each result has size 1.
 

@@ -50,7 +50,7 @@ ROOM = 0.35
 LEAST = 0.02
 """Minimum share of background in a texture whose mattes are measured."""
 ENOUGH = 0.15
-"""Minimum share of the texture outside of elements and mattes that a new background needs.
+"""Minimum share of the texture that must be outside elements and mattes, so that a new background can be synthesised.
 
 With a smaller share, features of the background repeat visibly.
 """

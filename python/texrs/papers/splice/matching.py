@@ -52,10 +52,10 @@ TURN = 0.75
 The factor is below 1 because several rotations of a lattice have nearly equal costs.
 """
 OFFSETS, NEARER = 6, 0.9
-"""Number of tried offsets of a connected figure's layout along each axis. Maximum relative cost of a preferred offset.
-"""
+"""Number of offsets of a connected figure's layout that are tried along each axis, and maximum relative cost of a
+preferred offset."""
 ALONE = 0.5
-"""Minimum distance from an empty place to all elements, in spacings, for which an element is moved to the place."""
+"""Minimum distance, in spacings, from an empty place to all elements. An element is moved to such a place."""
 CLEARANCE = 1.08
 """Minimum distance between the centres of elements, as a multiple of their diameter."""
 

@@ -2,8 +2,8 @@
 
 Nothing is sown if a lattice continues, or if the requested box is near the image. Otherwise the points are drawn as
 discs, and the drawing is grown by quilting, which avoids cuts through discs. The points are then read from the grown
-drawing. Points of the image itself do not change. Elements are sown in the same way, so that their neighbours are
-neighbours in the image as well. Elements that the border cuts are not sown.
+drawing. Points of the image itself do not change. Elements are sown in the same way, so that neighbours are also
+neighbours in the image. Elements that the border cuts are not sown.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def _sow_once(
     high: Points,
     radius: Reals | None,
 ) -> Sown | None:
-    """Sow points by their arrangement between the ``ends`` of an image. Return None if this area is too small."""
+    """Sow points in the arrangement that they have between ``ends``. Return None if this area is too small."""
     unit = float(np.clip(LARGE * scale / (high - low).max(), *DRAWN)) / scale
     too_small = (ends[1] - ends[0]).min() < 2 * SMALLEST * scale
     if len(points) < FEWEST or (high - low).max() * unit > 4 * LARGE or too_small:

@@ -33,7 +33,7 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 SEEN = 0.1
-"""Minimum share of visible background for which a texture's background is completed."""
+"""Minimum share of the image that is visible background. With less, the background is not completed."""
 BELOW = 3
 """Width of the band inside outlines with a completed background, in pixels, so that elements can be cut into it."""
 CROWDED = 0.75
@@ -76,7 +76,7 @@ class Rearrangement:
 
 
 def rearrange(a: ElementAnalysis, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
-    """Put the elements of a texture where an edit moves them. Return None if too little background is visible.
+    """Move the elements of a texture as an edit specifies. Return None if too little background is visible.
 
     Parameters
     ----------

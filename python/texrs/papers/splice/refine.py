@@ -52,7 +52,7 @@ The second number is the minimum roughness of a patch, relative to the backgroun
 gradient of a patch, edges included, relative to the background.
 """
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
-"""Minimum number of patches as rough as the background for which other patches are not used.
+"""Number of patches as rough as the background that is sufficient, so that other patches are not used.
 
 The second number is the minimum number of patches of any roughness. The third is the maximum number of patches that
 are tried, because all patches of a plain background fit.

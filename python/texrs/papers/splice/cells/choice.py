@@ -39,9 +39,9 @@ TRUSTED = 0.5
 GROUP = 256
 """Number of targets that are compared at once, to limit memory."""
 ENOUGH = 6
-"""Minimum number of complete and certain cells for which less certain cells are not used."""
+"""Number of complete and certain cells that is sufficient, so that less certain cells are not used."""
 FEW = 3
-"""Minimum number of complete cells, of any certainty, for which cells that the border cuts are not used."""
+"""Number of complete cells, of any certainty, that is sufficient, so that cells that the border cuts are not used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

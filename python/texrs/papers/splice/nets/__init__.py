@@ -1,4 +1,4 @@
-"""Splice nets by their graph: each target gets a knot of A with its lines, cut along those of its neighbours.
+"""Splice nets by their graph: each target gets a knot of A with its lines, joined to its neighbours' lines.
 
 A net, such as chainmail or a keyboard, is connected but not divided into cells. Its elements are the knots. The
 printed deformation (Liu et al. 2009, Eq. 5) reaches only half of the displacements of a net, and tears or mirrors
