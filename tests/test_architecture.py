@@ -33,7 +33,7 @@ LAYERS = (
     ("volume", "layouts"),
     ("synthesis", "metrics"),
     ("_palettes",),
-    ("_verbs",),
+    ("_verbs", "_comparison_of_ways"),
     ("quilting",),
     ("growth",),
     ("tiling",),

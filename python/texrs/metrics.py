@@ -164,7 +164,7 @@ def evaluate(
         raise InvalidInput(f"source: must have one exemplar of shape {known.shape}, got {source.shapes}")
     cyclic = as_wrap(wrap)
     traits = known.cached(("traits", elements.key), lambda: _measure_traits(known, elements))
-    seams = [_find_seam(source, axis, cyclic[axis]) for axis in range(2)]
+    seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
     seam_blur = 0.0
     if image is not None:
         pixels = guidance(as_image(image, "image"))
@@ -234,9 +234,9 @@ def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
     slopes = np.concatenate(np.gradient(soft, axis=(0, 1)), axis=-1).astype(np.float32)
     sizes = np.abs(slopes).reshape(*exemplar.shape, 2, -1).mean(axis=-1)
     own = SourceMap.identity(exemplar.shape)
-    pairs = [_Seam(own, axis, *_list_neighbours(exemplar.shape, axis)) for axis in range(2)]
+    pairs = [Seam(own, axis, *list_neighbours(exemplar.shape, axis)) for axis in range(2)]
     line = max(float(np.percentile(sizes, EDGE)), 1e-6)
-    broken, lines = (float(marks.mean()) for marks in _find_breaks(slopes, line, pairs))
+    broken, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
     step = float(np.percentile(steps, VISIBLE))
     return _Traits(colours, depth, float(outline), step, slopes, line, broken, lines, _measure_salience(colours, depth))
 
@@ -260,7 +260,7 @@ def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seam:
+class Seam:
     """Pairs of neighbouring pixels along an axis whose sources are not neighbours."""
 
     source: SourceMap
@@ -279,23 +279,23 @@ class _Seam:
         return self.at, self.after
 
 
-def _list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
+def list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
     """Return the pixels of an image that have a neighbour along an axis, and these neighbours."""
     at = np.nonzero(np.ones([n - (a == axis) for a, n in enumerate(shape)], bool))
     return at, tuple(index + (a == axis) for a, index in enumerate(at))
 
 
-def _find_seam(source: SourceMap, axis: int, wrap: bool) -> _Seam:
+def find_seam(source: SourceMap, axis: int, wrap: bool) -> Seam:
     """Return the pairs of neighbours along an axis that a seam separates."""
     parted = ~source.is_coherent(axis, wrap=wrap)
     if not wrap:
         np.moveaxis(parted, axis, 0)[-1] = False
     at = np.nonzero(parted)
     after = tuple((index + (a == axis)) % n for a, (index, n) in enumerate(zip(at, source.shape, strict=True)))
-    return _Seam(source, axis, at, after)
+    return Seam(source, axis, at, after)
 
 
-def _measure_tears(traits: _Traits, seams: list[_Seam], area: int) -> float:
+def _measure_tears(traits: _Traits, seams: list[Seam], area: int) -> float:
     """Return the length of seams inside elements, divided by the expected outline length."""
     length = 0.0
     for seam in seams:
@@ -306,14 +306,14 @@ def _measure_tears(traits: _Traits, seams: list[_Seam], area: int) -> float:
     return length / max(traits.outlines * area, 1.0)
 
 
-def _measure_breaks(traits: _Traits, seams: list[_Seam], area: int) -> float:
+def _measure_breaks(traits: _Traits, seams: list[Seam], area: int) -> float:
     """Return the length of lines that break off at seams, minus the usual length, as a share of all lines."""
-    found, _ = _find_breaks(traits.slopes, traits.line, seams)
+    found, _ = find_breaks(traits.slopes, traits.line, seams)
     excess = float(found.sum()) - traits.broken * len(found)
     return max(0.0, excess) / max(traits.lines * area, 1.0)
 
 
-def _find_breaks(slopes: Floats, line: float, seams: list[_Seam]) -> tuple[Bools, Bools]:
+def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, Bools]:
     """Return masks of the pairs with a broken crossing line, and of the pairs with any line.
 
     A line crosses a seam if there is a strong gradient along the seam. It is broken if the other side does not have a
@@ -339,7 +339,7 @@ def _find_breaks(slopes: Floats, line: float, seams: list[_Seam]) -> tuple[Bools
     return np.concatenate(broken), np.concatenate(lines)
 
 
-def _list_slopes(slopes: Floats, seam: _Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
+def _list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
     """Return the gradients along an output axis at the sources of pixels, and one pixel to each side."""
     source = seam.source
     frame = source.jacobian_array()
@@ -356,7 +356,7 @@ def _list_slopes(slopes: Floats, seam: _Seam, at: tuple[NDArray[np.intp], ...], 
     return found
 
 
-def _measure_blur(traits: _Traits, source: SourceMap, seams: list[_Seam], image: Floats) -> float:
+def _measure_blur(traits: _Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
     """Return the share of the detail of the sources that is missing next to seams."""
     from scipy.ndimage import binary_dilation, laplace
 

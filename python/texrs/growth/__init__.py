@@ -11,7 +11,7 @@ from texrs.growth.engine import Grown, Patches, Start, grow, keep
 from texrs.growth.scales import FROM_ATLAS, grow_from_atlas
 from texrs.growth.settings import Settings
 from texrs.growth.sheets import FromSheet, stitch_sheet
-from texrs.growth.start import from_draft, from_patches, patch_side
+from texrs.growth.start import from_draft, from_patches, patch_side, stitch_image
 from texrs.growth.windows import Windows
 
 __all__ = [
@@ -32,5 +32,6 @@ __all__ = [
     "grow_from_atlas",
     "keep",
     "patch_side",
+    "stitch_image",
     "stitch_sheet",
 ]

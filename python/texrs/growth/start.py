@@ -5,21 +5,22 @@ The engine's own start, hashed blocks at the coarsest level, is in `texrs.growth
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._engine.pyramid import ONE, Region
+from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import Weights
 from texrs._progress import answering, stage
-from texrs._typing import Progress
+from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.growth.constraints import Asked
-from texrs.growth.engine import Patches, Places, Start
+from texrs.growth.engine import Patches, Places, Start, grow, keep
 
-__all__ = ["bends_with", "from_draft", "from_patches", "patch_side", "weights_of"]
+__all__ = ["bends_with", "from_draft", "from_patches", "patch_side", "stitch_image", "weights_of"]
 
 PATCH = {2: 0.45, 3: 0.68}
 """Side of a patch, as a share of the exemplar's shortest side, by number of axes.
@@ -133,3 +134,36 @@ def patch_side(shape: tuple[int, ...]) -> float:
 def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:
     """Return a start that uses given source coordinates, which may be overwritten."""
     return Start(level, lambda region, frames, asked, progress: (draft(region), None))
+
+
+def stitch_image(
+    exemplar: Exemplar, size: Sequence[int], wrap: Sequence[bool], seed: int, progress: Progress | None = None
+) -> tuple[Floats, NDArray[np.uint32]]:
+    """Stitch an image of any size from unrotated patches of an exemplar.
+
+    Parameters
+    ----------
+    exemplar : Exemplar
+        The exemplar, an image.
+    size : (int, int)
+        Rows and columns of the result.
+    wrap : (bool, bool)
+        Axes along which the result is periodic.
+    seed : int
+        Seed of the choice of patches.
+    progress : callable, optional
+        Function that is called as ``progress(stage, share)``.
+
+    Returns
+    -------
+    coordinates : (rows, columns, 2) float32
+        Position of each pixel in the exemplar, in pixels.
+    patches : (rows, columns) uint32
+        Patch of each pixel.
+
+    """
+    region = Region.whole(size, wrap)
+    grown = grow(region, 1, from_patches(exemplar, 0, seed), keep, partial(to_fixed, None), progress=progress)
+    assert grown.patches is not None
+    places = grown.places.reshape(*region.shape, 2) / np.float32(ONE)
+    return places.astype(np.float32, copy=False), grown.patches.labels.reshape(region.shape)

@@ -148,11 +148,12 @@ def design(
         used. Default: the default options.
     deformation : DeformationOptions
         Options that control how elements are deformed. Default: the default options.
-    motion : {"auto", "move", "keep"}
+    motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
-        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such
-        as a stone wall, is built course by course unless "move" is given. Default: "auto".
+        patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
+        best. "auto" tries all three at a small size and uses the best one. With "auto", elements move if
+        ``deformation`` or ``method`` is given. An exemplar in courses, such as a stone wall, is built course by course
+        unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
@@ -199,10 +200,11 @@ def design(
         - ``reason``: Reason for this kind, as one sentence.
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
-        - ``motion``: For each example: "move" or "keep".
-        - ``candidates``: For each example, the scores of each motion that was tried, or None without a trial. The
-          scores are ``score`` (0 is best), ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of
-          `texrs.metrics.evaluate`.
+        - ``motion``: For each example: "move", "keep" or "stitch".
+        - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial:
+          ``score`` (0 is best), missing regularity (``irregular``), lines that break off (``broken``,
+          ``broken_coarse``), cells unlike the example (``foreign``), steps of tone at seams (``stepped``), and
+          ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that the texture is built from, or None.
         - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
         - ``rotate``: Largest permitted rotation of elements of the first example, in degrees.
@@ -332,11 +334,12 @@ def design_variants(
         used. Default: the default options.
     deformation : DeformationOptions
         Options that control how elements are deformed. Default: the default options.
-    motion : {"auto", "move", "keep"}
+    motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images between them. "auto" tries both at a small size and uses the
-        better one. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such
-        as a stone wall, is built course by course unless "move" is given. Default: "auto".
+        patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
+        best. "auto" tries all three at a small size and uses the best one. With "auto", elements move if
+        ``deformation`` or ``method`` is given. An exemplar in courses, such as a stone wall, is built course by course
+        unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional

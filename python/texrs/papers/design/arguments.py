@@ -119,7 +119,7 @@ def check_arguments(
         raise InvalidInput(
             f"density: cannot be combined with {other}, because density scatters elements over the first exemplar"
         )
-    as_choice(motion, "motion", ("auto", "move", "keep"))
+    as_choice(motion, "motion", ("auto", "move", "keep", "stitch"))
     arguments = Arguments(
         exemplars,
         scale_together(exemplars),

@@ -44,8 +44,10 @@ class Plan:
     """If True, holes are filled with background only."""
     still: bool = False
     """If True, elements stay in place, so that only patches give variety."""
+    stitched: bool = False
+    """If True, the stitcher of `texrs.growth` places the patches, each where it fits best. Elements stay in place."""
     tried: Mapping[str, Mapping[str, float]] | None = None
-    """Scores of each plan that was tried, or None."""
+    """Scores of each way that was tried, or None."""
     tiles: Sequence[Tile] = ()
     """Tiles that the trial has just computed. A texture with the trial's seed uses them again."""
 

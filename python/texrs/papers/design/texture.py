@@ -13,6 +13,7 @@ from texrs._typing import Array, Floats, Progress
 from texrs.blending import apply, measure_visibility
 from texrs.exemplar.regularity import bend
 from texrs.exemplar.symmetry import flip_frame
+from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
@@ -66,6 +67,8 @@ def stitch_alone(
 ) -> SourceMap:
     """Stitch patches of the tiles of one exemplar."""
     plan = plans[number]
+    if plan.stitched:
+        return stitch_patches(number, arguments, seed)
     courses = plan.parts.courses if plan.still else None
     side = min(plan.guide.shape[:2])
     pictures = (
@@ -81,6 +84,17 @@ def stitch_alone(
         seed=seed,
         progress=partial(report_share, arguments.watch, number, len(plans)),
     )
+
+
+def stitch_patches(number: int, arguments: Arguments, seed: int) -> SourceMap:
+    """Stitch patches of one exemplar, each from the place where it fits best. The patches are not mirrored."""
+    watch = partial(report_share, arguments.watch, number, len(arguments.guides))
+    coordinates, patches = stitch_image(
+        arguments.guides[number], arguments.size, arguments.wrap, seed, lambda stage, share: watch(share)
+    )
+    exemplars = np.full(patches.shape, number, np.uint16)
+    frames = np.broadcast_to(np.eye(2, dtype=np.float32), (int(patches.max()) + 1, 2, 2)).copy()
+    return SourceMap(coordinates, exemplars, patches, frames, arguments.shapes)
 
 
 def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:

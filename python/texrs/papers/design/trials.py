@@ -1,8 +1,8 @@
-"""Choose whether elements move, by a trial at a small size.
+"""Choose the way in which an exemplar is rearranged, by trials at a small size.
 
 This is a departure from the paper, which always moves elements. Elements that are close together, or were not
 segmented correctly, are torn if they move. Patches of the unchanged exemplar then give a better texture, because their
-seams run between elements.
+seams run between elements. They are placed on a grid ("keep"), or each where it fits best ("stitch").
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from texrs._comparison_of_ways import Judge, compare
+from texrs._typing import Array
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.metrics import evaluate
 from texrs.papers.design.arguments import Arguments
@@ -26,11 +28,8 @@ from texrs.source_map import SourceMap
 
 __all__ = ["choose_plan", "make_composite"]
 
-CLEARLY = 0.85
-"""Ratio of the score without motion to the score with motion, below which elements stay in place.
-
-It is below 1 because deformation gives more variety.
-"""
+EQUAL = 0.02
+"""Difference of scores below which two ways are equally good. The one that repeats less is then used."""
 LEAST, SHARE = 192, 0.75
 """Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
 TILES = 2
@@ -58,7 +57,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
 
 
 def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:
-    """Decide whether elements move: as requested, or by the better score.
+    """Choose the way in which an exemplar is rearranged: as requested, or the way with the best trial.
 
     Parameters
     ----------
@@ -74,29 +73,38 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
 
     """
     still = replace(plan, still=True)
-    if plan.parts.courses and arguments.motion != "move":
+    ways = {"move": plan, "keep": still, "stitch": replace(still, stitched=True)}
+    if plan.literal:
+        return plan
+    if arguments.motion != "auto":
+        return ways[arguments.motion]
+    if plan.parts.courses:
         return still
-    if plan.literal or arguments.motion != "auto" or arguments.deformation != DeformationOptions():
-        return still if arguments.motion == "keep" and not plan.literal else plan
-    ways = {"move": plan, "keep": still}
+    if arguments.deformation != DeformationOptions():
+        return plan
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[str, list[Tile]] = {}
 
     def judge_each() -> Mapping[str, Mapping[str, float]]:
-        figures = {}
+        judge = exemplar.cached("judge of ways", lambda: Judge(exemplar))
+        faults, use = {}, {}
         for name, way in ways.items():
-            made[name], figures[name] = try_plan(way, exemplar, elements, arguments)
-        return figures
+            made[name], source, image = try_way(way, exemplar, arguments, list(ways).index(name) / len(ways))
+            faults[name] = judge.measure(source, image, wrap=True)
+            known = evaluate(exemplar, source, elements=elements, wrap=True)
+            use[name] = {"repetition": round(known.repetition, 4), "coverage": round(known.coverage, 4)}
+        scores = compare(faults)
+        return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in ways}
 
     tried = exemplar.cached(key, judge_each)
-    best = "keep" if tried["keep"]["score"] < CLEARLY * tried["move"]["score"] else "move"
+    least = min(each["score"] for each in tried.values())
+    equal = [name for name, each in tried.items() if each["score"] <= least + EQUAL]
+    best = min(equal, key=lambda name: tried[name]["repetition"])
     return replace(ways[best], tried=tried, tiles=made.get(best, ()))
 
 
-def try_plan(
-    plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments
-) -> tuple[list[Tile], Mapping[str, float]]:
-    """Synthesise a small texture with a plan, and return its tiles and its scores."""
+def try_way(plan: Plan, exemplar: Exemplar, arguments: Arguments, done: float) -> tuple[list[Tile], SourceMap, Array]:
+    """Synthesise a small texture in one way, and return its tiles, source map and image."""
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
@@ -107,8 +115,8 @@ def try_plan(
         shares=np.ones(1),
         density=None,
         copies=min(TILES, arguments.copies),
-        watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
+        watch=lambda stage, share: arguments.watch("try", done),
     )
     tiles, composite = make_composite([plan], small, TRIAL)
     image, _ = correct_colours(composite, look_up(composite, small), small)
-    return tiles, evaluate(exemplar, composite, image, elements=elements, wrap=True).report()
+    return tiles, composite, image
