@@ -22,7 +22,9 @@ def chosen(gravel):
 
 def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     [tried] = chosen["auto"].report["candidates"]
-    assert sorted(tried) == ["keep", "move", "stitch"]
+    # Moved cells of a grid are not tried.
+    ways = {"keep", "stitch"} if chosen["auto"].report["segmentation"] == "grid" else {"move", "keep", "stitch"}
+    assert set(tried) == ways
     [best] = chosen["auto"].report["motion"]
     assert tried[best]["score"] <= min(each["score"] for each in tried.values()) + EQUAL
     for plan in ("move", "keep", "stitch"):

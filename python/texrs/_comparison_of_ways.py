@@ -1,6 +1,6 @@
 """Compare textures of one exemplar that were synthesised in different ways, by what the eye dislikes.
 
-Five figures are measured, each 0 for a crop of the exemplar. None of them knows of a segmentation:
+Six figures are measured, each 0 for a crop of the exemplar. None of them knows of a segmentation:
 
 - ``irregular``: peaks of the exemplar's autocorrelation that are missing. It shows torn weaves, ornaments and courses.
 - ``broken``, ``broken_coarse``: lines that break off at seams, at two scales: outlines, and joints some pixels wide.
@@ -8,6 +8,7 @@ Five figures are measured, each 0 for a crop of the exemplar. None of them knows
   cells are from each other. It shows fused, foggy and bent elements.
 - ``stepped``: seams with a larger difference of tone beside them, relative to the roughness there, than 95 % of the
   neighbours in the exemplar. It shows cuts through plain faces.
+- ``blotched``: the same for tones averaged over about 20 pixels. It shows patches from places with other light.
 
 Exemplars differ more in these figures than ways do. Ways of one exemplar are therefore compared: each figure is divided
 by its mean over the ways plus a floor below which a fault is not visible. The score is the mean of the square roots.
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +43,22 @@ LINE, USUAL = 85, 95
 """Percentile of gradients above which a pixel is on a line, and percentile of the exemplar's own values above which a
 cell is foreign or a seam is a step.
 """
-MOST = 1024
+FAINT = 0.1
+"""Deviation of a colour difference, relative to that of the lightness, below which it is not compared."""
+MOST = 512
 """Largest number of cells of the exemplar that other cells are compared with."""
-FLOORS = {"irregular": 0.05, "broken": 0.003, "broken_coarse": 0.002, "foreign": 0.03, "stepped": 0.05}
+SOFT, APART = 6.0, 8
+"""Standard deviation for averaging tones, and distance from a seam at which they are compared, in pixels."""
+PAIRS = 20_000
+"""Number of pairs of neighbours from which the shares of the exemplar are estimated, to about 1 %."""
+FLOORS = {
+    "irregular": 0.05,
+    "broken": 0.003,
+    "broken_coarse": 0.002,
+    "foreign": 0.03,
+    "stepped": 0.05,
+    "blotched": 0.05,
+}
 """Values of the figures below which a fault is hardly visible. Chosen by eye on half of 51 pictures."""
 
 
@@ -56,6 +71,7 @@ class Faults:
     broken_coarse: float
     foreign: float
     stepped: float
+    blotched: float
 
     def report(self) -> dict[str, float]:
         """Return the figures, rounded to four places."""
@@ -80,7 +96,10 @@ class Judge:
     """
 
     def __init__(self, exemplar: Exemplar) -> None:
-        self.planes = split_colours(exemplar.guidance)
+        planes = split_colours(exemplar.guidance)
+        spread = planes.std(axis=(1, 2))
+        self.kept = [0, *(k for k in range(1, len(planes)) if spread[k] > FAINT * spread[0])]
+        self.planes = planes[self.kept]
         self.peaks, self.heights, self.reach = find_peaks(self.planes[0])
         self.lines = {scale: measure_lines(exemplar.guidance, scale) for scale in (1.0, 2.0)}
         ask()
@@ -95,21 +114,28 @@ class Judge:
         own = find_distances(self.cells, self.cells, beside)
         self.usual = float(np.percentile(own[np.isfinite(own)], USUAL)) if np.isfinite(own).any() else np.inf
         ask()
-        pairs = [list_neighbours(exemplar.shape, axis)[0] for axis in range(2)]
+        pairs = [pick(list_neighbours(exemplar.shape, axis)[0]) for axis in range(2)]
         steps = [rate_steps(self.planes, axis, at) for axis, at in enumerate(pairs)]
         self.step = float(np.percentile(np.concatenate(steps), USUAL))
+        tones = soften(self.planes)
+        self.blot = float(
+            np.percentile(np.concatenate([rate_tones(tones, k, at) for k, at in enumerate(pairs)]), USUAL)
+        )
 
     def measure(self, source: SourceMap, image: Array, *, wrap: bool) -> Faults:
         """Return the faults of a texture with its source map. `wrap` states whether both axes are periodic."""
-        planes, area = split_colours(guidance(as_image(image))), source.shape[0] * source.shape[1]
+        planes, area = split_colours(guidance(as_image(image)))[self.kept], source.shape[0] * source.shape[1]
         seams = [find_seam(source, axis, wrap) for axis in range(2)]
         fine, coarse = (self.count_breaks(scale, seams, area) for scale in (1.0, 2.0))
         ask()
         far = find_distances(self.normalise(measure_energies(planes)), self.cells) > self.usual
         ask()
-        steps = np.concatenate([rate_steps(planes, axis, seam.at) > self.step for axis, seam in enumerate(seams)])
-        stepped = (float(steps.mean()) if len(steps) else 0.0) - (1 - USUAL / 100)
-        return Faults(self.miss_peaks(planes[0]), fine, coarse, float(far.mean()), float(np.clip(stepped, 0, 0.4)))
+        tones, excess = soften(planes), []
+        for rate, values, most in ((rate_steps, planes, self.step), (rate_tones, tones, self.blot)):
+            above = np.concatenate([rate(values, axis, seam.at) > most for axis, seam in enumerate(seams)])
+            share = float(above.mean()) if len(above) else 0.0
+            excess.append(float(np.clip(share - (1 - USUAL / 100), 0, 0.4)))
+        return Faults(self.miss_peaks(planes[0]), fine, coarse, float(far.mean()), *excess)
 
     def miss_peaks(self, light: Floats) -> float:
         """Return the share of the peaks' height that a texture lacks. Each is looked for around its place."""
@@ -173,6 +199,12 @@ def find_peaks(light: Floats) -> tuple[NDArray[np.intp], Floats, tuple[int, int]
     return at, found[tuple(at.T)], (rows, columns)
 
 
+def pick(at: tuple[NDArray[np.intp], ...]) -> tuple[NDArray[np.intp], ...]:
+    """Return some of many pixels, evenly spread, for measuring shares."""
+    step = max(1, len(at[0]) // PAIRS)
+    return tuple(index[::step] for index in at)
+
+
 def measure_lines(colours: Floats, scale: float) -> tuple[Floats, float, float, float]:
     """Return gradients, the least gradient of a line, and the shares of neighbours with a broken line and with a line."""
     from scipy.ndimage import gaussian_filter
@@ -181,9 +213,24 @@ def measure_lines(colours: Floats, scale: float) -> tuple[Floats, float, float, 
     slopes = np.concatenate(np.gradient(soft, axis=(0, 1)), axis=-1).astype(np.float32)
     line = max(float(np.percentile(np.abs(slopes).reshape(*shape, 2, -1).mean(axis=-1), LINE)), 1e-6)
     own = SourceMap.identity(shape)
-    pairs = [Seam(own, axis, *list_neighbours(shape, axis)) for axis in range(2)]
+    pairs = [Seam(own, axis, *(pick(side) for side in list_neighbours(shape, axis))) for axis in range(2)]
     usual, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
     return slopes, line, usual, lines
+
+
+@lru_cache(maxsize=16)
+def make_filters(shape: tuple[int, int], scales: tuple[int, ...]) -> Floats:
+    """Return the spectra of filters of six orientations at some scales, (filters, H, W), for images of a size."""
+    from scipy import fft
+
+    row, column = np.meshgrid(*(fft.fftfreq(n) for n in shape), indexing="ij")
+    radius, angle, found = np.maximum(np.hypot(row, column), 1e-6), np.arctan2(row, column), []
+    for scale in scales:
+        radial = np.exp(-0.5 * (np.log2(radius / (0.33 / 2**scale)) / 0.55) ** 2)
+        for k in range(ORIENTATIONS):
+            off = np.angle(np.exp(1j * (angle - np.pi * k / ORIENTATIONS)))
+            found.append((radial * np.exp(-0.5 * (off / (0.7 * np.pi / ORIENTATIONS)) ** 2)).astype(np.float32))
+    return np.asarray(found)
 
 
 def filter_oriented(x: Floats, scales: tuple[int, ...]) -> Floats:
@@ -192,17 +239,11 @@ def filter_oriented(x: Floats, scales: tuple[int, ...]) -> Floats:
 
     # The margin is about the reach of the widest filter.
     margin = 16
-    padded = np.pad(x, margin, mode="symmetric").astype(np.float32)
-    row, column = np.meshgrid(*(fft.fftfreq(n) for n in padded.shape), indexing="ij")
-    radius, angle = np.maximum(np.hypot(row, column), 1e-6), np.arctan2(row, column)
-    spectrum, found = fft.fft2(padded), []
-    for scale in scales:
-        radial = np.exp(-0.5 * (np.log2(radius / (0.33 / 2**scale)) / 0.55) ** 2)
-        for k in range(ORIENTATIONS):
-            off = np.angle(np.exp(1j * (angle - np.pi * k / ORIENTATIONS)))
-            bank = (radial * np.exp(-0.5 * (off / (0.7 * np.pi / ORIENTATIONS)) ** 2)).astype(np.float32)
-            found.append(np.abs(fft.ifft2(spectrum * bank))[margin:-margin, margin:-margin])
-    return np.asarray(found, np.float32)
+    size = [fft.next_fast_len(n + 2 * margin) for n in x.shape]
+    after = [n - m - margin for n, m in zip(size, x.shape, strict=True)]
+    padded = np.pad(x, [(margin, n) for n in after], mode="symmetric").astype(np.float32)
+    spectrum, inside = fft.fft2(padded), tuple(slice(margin, -n) for n in after)
+    return np.stack([np.abs(fft.ifft2(spectrum * one)[inside]) for one in make_filters(padded.shape, scales)])
 
 
 def average(x: Floats, side: int) -> Floats:
@@ -258,3 +299,18 @@ def rate_steps(planes: Floats, axis: int, at: tuple[NDArray[np.intp], ...]) -> F
     rough = sum(np.abs(np.diff(side, axis=0)).sum(axis=1).mean(axis=0) for side in (before, behind))
     # A hundredth of the range is the least roughness, so that noise in flat areas is not a step.
     return np.asarray(step / (rough + 0.01), np.float32)
+
+
+def soften(planes: Floats) -> Floats:
+    """Return planes averaged over about 20 pixels."""
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(planes, (0, SOFT, SOFT)), np.float32)
+
+
+def rate_tones(tones: Floats, axis: int, at: tuple[NDArray[np.intp], ...]) -> Floats:
+    """Return how much averaged tones on both sides of places differ."""
+    lines = np.moveaxis(tones, 1 + axis, 1)
+    here, aside = at[axis], at[1 - axis]
+    before, behind = (lines[:, np.clip(here + s, 0, lines.shape[1] - 1), aside] for s in (-APART, APART + 1))
+    return np.asarray(np.abs(before - behind).sum(axis=0), np.float32)

@@ -171,7 +171,7 @@ def evaluate(
         if pixels.shape[:2] != source.shape:
             raise InvalidInput(f"image: must have the size of the source map, {source.shape}, got {pixels.shape[:2]}")
         seam_blur = _measure_blur(traits, source, seams, pixels)
-    repetition, coverage = _measure_use(traits, source)
+    repetition, coverage = measure_use(traits.salience, traits.colours.shape, source)
     area = source.shape[0] * source.shape[1]
     return Quality(
         _measure_tears(traits, seams, area), _measure_breaks(traits, seams, area), seam_blur, repetition, coverage
@@ -238,10 +238,10 @@ def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
     line = max(float(np.percentile(sizes, EDGE)), 1e-6)
     broken, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
     step = float(np.percentile(steps, VISIBLE))
-    return _Traits(colours, depth, float(outline), step, slopes, line, broken, lines, _measure_salience(colours, depth))
+    return _Traits(colours, depth, float(outline), step, slopes, line, broken, lines, measure_salience(colours, depth))
 
 
-def _measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
+def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
     """Return how conspicuous each cell is.
 
     The value is the deviation of a cell's mean colour and contrast from the medians of all cells, in standard
@@ -377,10 +377,10 @@ def _measure_blur(traits: _Traits, source: SourceMap, seams: list[Seam], image: 
     return float(np.clip(1 - shown / wanted, 0, 1)) if wanted > 0 else 0.0
 
 
-def _measure_use(traits: _Traits, source: SourceMap) -> tuple[float, float]:
+def measure_use(salience: NDArray[np.float64], shape: tuple[int, ...], source: SourceMap) -> tuple[float, float]:
     """Return the amount of exact repetition, and the share of the exemplar that is shown."""
-    rows, columns = traits.salience.shape
-    last = np.array(traits.colours.shape[:2]) - 1
+    rows, columns = salience.shape
+    last = np.array(shape[:2]) - 1
     row, column = np.moveaxis(np.clip(np.rint(source.coordinates), 0, last).astype(np.intp) // CELL, -1, 0)
     cell = (row * columns + column).ravel()
     area = np.bincount(cell, minlength=rows * columns)
@@ -390,8 +390,7 @@ def _measure_use(traits: _Traits, source: SourceMap) -> tuple[float, float]:
         key = ways.ravel() * (rows * columns) + cell
     shown, number = np.unique(key, return_inverse=True)
     times = np.bincount(number) / CELL**2
-    again = traits.salience.ravel()[shown % (rows * columns)] * times * np.maximum(times - 1, 0)
-    shape = traits.colours.shape
+    again = salience.ravel()[shown % (rows * columns)] * times * np.maximum(times - 1, 0)
     drawn = cell.size / (shape[0] * shape[1])
     repetition = float(again.sum() / (cell.size / CELL**2) / drawn)
     coverage = min(1.0, float((area > CELL).mean()) / min(1.0, drawn))

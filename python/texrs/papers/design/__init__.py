@@ -151,9 +151,9 @@ def design(
     motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries all three at a small size and uses the best one. With "auto", elements move if
-        ``deformation`` or ``method`` is given. An exemplar in courses, such as a stone wall, is built course by course
-        unless "move" or "stitch" is given. Default: "auto".
+        best. "auto" tries these at a small size and uses the best one, but does not move the cells of a grid, and does
+        not stitch a lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
+        courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
@@ -203,8 +203,8 @@ def design(
         - ``motion``: For each example: "move", "keep" or "stitch".
         - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial:
           ``score`` (0 is best), missing regularity (``irregular``), lines that break off (``broken``,
-          ``broken_coarse``), cells unlike the example (``foreign``), steps of tone at seams (``stepped``), and
-          ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
+          ``broken_coarse``), cells unlike the example (``foreign``), fine and coarse steps of tone at seams
+          (``stepped``, ``blotched``), and ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that the texture is built from, or None.
         - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
         - ``rotate``: Largest permitted rotation of elements of the first example, in degrees.
@@ -337,9 +337,9 @@ def design_variants(
     motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries all three at a small size and uses the best one. With "auto", elements move if
-        ``deformation`` or ``method`` is given. An exemplar in courses, such as a stone wall, is built course by course
-        unless "move" or "stitch" is given. Default: "auto".
+        best. "auto" tries these at a small size and uses the best one, but does not move the cells of a grid, and does
+        not stitch a lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
+        courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional

@@ -15,14 +15,14 @@ import numpy as np
 from texrs._comparison_of_ways import Judge, compare
 from texrs._typing import Array
 from texrs.exemplar import ElementOptions, Exemplar
-from texrs.metrics import evaluate
+from texrs.metrics import measure_salience, measure_use
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan
-from texrs.papers.design.texture import correct_colours, look_up, say_finish, stitch_tiles
+from texrs.papers.design.texture import DEEP, correct_colours, look_up, say_finish, stitch_tiles
 from texrs.papers.design.tiles import fill_holes
 from texrs.source_map import SourceMap
 
@@ -82,17 +82,24 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         return still
     if arguments.deformation != DeformationOptions():
         return plan
+    if plan.parts.kind == "grid":
+        # Moved cells of a grid show more seams than patches, and nothing else.
+        del ways["move"]
+    if plan.parts.lattice is not None:
+        # The stitcher does not keep its patches in step with a lattice.
+        del ways["stitch"]
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[str, list[Tile]] = {}
 
     def judge_each() -> Mapping[str, Mapping[str, float]]:
         judge = exemplar.cached("judge of ways", lambda: Judge(exemplar))
+        salience = measure_salience(exemplar.guidance, plan.parts.measure_depth(DEEP))
         faults, use = {}, {}
         for name, way in ways.items():
             made[name], source, image = try_way(way, exemplar, arguments, list(ways).index(name) / len(ways))
             faults[name] = judge.measure(source, image, wrap=True)
-            known = evaluate(exemplar, source, elements=elements, wrap=True)
-            use[name] = {"repetition": round(known.repetition, 4), "coverage": round(known.coverage, 4)}
+            repetition, coverage = measure_use(salience, exemplar.shape, source)
+            use[name] = {"repetition": round(repetition, 4), "coverage": round(coverage, 4)}
         scores = compare(faults)
         return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in ways}
 
