@@ -4,14 +4,15 @@ Six figures are measured, each 0 for a crop of the exemplar. None of them knows 
 
 - ``irregular``: peaks of the exemplar's autocorrelation that are missing. It shows torn weaves, ornaments and courses.
 - ``broken``, ``broken_coarse``: lines that break off at seams, at two scales: outlines, and joints some pixels wide.
-- ``foreign``: cells of 8 pixels whose oriented energies are farther from all cells of the exemplar than 95 % of its own
-  cells are from each other. It shows fused, foggy and bent elements.
-- ``stepped``: seams with a larger difference of tone beside them, relative to the roughness there, than 95 % of the
-  neighbours in the exemplar. It shows cuts through plain faces.
+- ``foreign``: cells of 8 pixels that are unlike all cells of the exemplar. The limit is the 95th percentile of the
+  distances between its own cells, measured in oriented energies. It shows fused, foggy and bent elements.
+- ``stepped``: seams with a step of tone, compared with the roughness on both sides. The limit is the 95th percentile of
+  all neighbours in the exemplar. It shows cuts through plain faces.
 - ``blotched``: the same for tones averaged over about 20 pixels. It shows patches from places with other light.
 
-Exemplars differ more in these figures than ways do. Ways of one exemplar are therefore compared: each figure is divided
-by its mean over the ways plus a floor below which a fault is not visible. The score is the mean of the square roots.
+Exemplars differ more in these figures than ways do, so only ways of one exemplar are compared. Each figure is divided by
+its mean over the ways plus a floor. The floor is a value at which the fault is hardly visible. The score is the mean of
+the square roots.
 Repetition is not a figure, because it does not agree with the eye.
 """
 
@@ -40,17 +41,16 @@ REACH, FAR, PEAKS, PEAK = 0.7, 96, 12, 0.15
 OVERLAP = 0.15
 """Least overlap of the image and its shifted copy, as a share of the image."""
 LINE, USUAL = 85, 95
-"""Percentile of gradients above which a pixel is on a line, and percentile of the exemplar's own values above which a
-cell is foreign or a seam is a step.
+"""Percentile of gradients above which a pixel is on a line, and percentile of the exemplar's values as a limit of faults.
 """
 FAINT = 0.1
 """Deviation of a colour difference, relative to that of the lightness, below which it is not compared."""
 MOST = 512
 """Largest number of cells of the exemplar that other cells are compared with."""
 SOFT, APART = 6.0, 8
-"""Standard deviation for averaging tones, and distance from a seam at which they are compared, in pixels."""
+"""Standard deviation for averaging tones, and their distance from a seam when they are compared, in pixels."""
 PAIRS = 20_000
-"""Number of pairs of neighbours from which the shares of the exemplar are estimated, to about 1 %."""
+"""Number of pairs of neighbours for estimating the shares of the exemplar, to about 1 %."""
 FLOORS = {
     "irregular": 0.05,
     "broken": 0.003,

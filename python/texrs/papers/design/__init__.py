@@ -41,9 +41,12 @@ Departures from the paper, with their reasons:
   replaced and its successor does not cover all of it, the rest remains visible. Patches never replace the inside of
   elements, because they would tear it.
 
-- Both moving the elements and leaving them in place are tried at a small size and scored (see `texrs.metrics`). If
-  moving scores clearly worse, elements stay in place, and only the patches give variety. This reduces the length of
-  torn outlines to a third for heaps of fruit, whose elements can only be cut out roughly.
+- The child layers are the elements that `texrs.exemplar.element_finder` finds, instead of segments of colour layers. If
+  an example has no elements, or if they are the meshes of a net, a jittered grid of cells takes their place.
+
+- Three ways are tried at a small size. Elements move, or they stay in place and large patches give variety, or smaller
+  patches are placed where they fit best. The way with the fewest faults is used. The faults are measured without a
+  segmentation: lost regularity, lines that break off, foreign content, and steps of tone.
 
 - Images are not mirrored along an axis if the mirror image looks different from the example. Light from one side and
   hanging leaves cause such a difference. ``rotate=0`` means that the example has an upper side, and disables
@@ -151,8 +154,8 @@ def design(
     motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries these at a small size and uses the best one, but does not move the cells of a grid, and does
-        not stitch a lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
+        best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
+        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
         courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
@@ -201,10 +204,11 @@ def design(
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``motion``: For each example: "move", "keep" or "stitch".
-        - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial:
-          ``score`` (0 is best), missing regularity (``irregular``), lines that break off (``broken``,
-          ``broken_coarse``), cells unlike the example (``foreign``), fine and coarse steps of tone at seams
-          (``stepped``, ``blotched``), and ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
+        - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial. 0 is
+          the best value of ``score`` and of the faults. The faults are missing regularity (``irregular``), fine and
+          coarse lines that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine
+          and coarse steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
+          of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that the texture is built from, or None.
         - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
         - ``rotate``: Largest permitted rotation of elements of the first example, in degrees.
@@ -337,8 +341,8 @@ def design_variants(
     motion : {"auto", "move", "keep", "stitch"}
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries these at a small size and uses the best one, but does not move the cells of a grid, and does
-        not stitch a lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
+        best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
+        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
         courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.

@@ -1,4 +1,4 @@
-"""Choose the way in which an exemplar is rearranged, by trials at a small size.
+"""Choose how an exemplar is rearranged, by trials at a small size.
 
 This is a departure from the paper, which always moves elements. Elements that are close together, or were not
 segmented correctly, are torn if they move. Patches of the unchanged exemplar then give a better texture, because their
@@ -57,7 +57,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
 
 
 def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:
-    """Choose the way in which an exemplar is rearranged: as requested, or the way with the best trial.
+    """Choose how an exemplar is rearranged: as requested, or as in the best trial.
 
     Parameters
     ----------
