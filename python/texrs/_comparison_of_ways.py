@@ -11,8 +11,7 @@ Six figures are measured, each 0 for a crop of the exemplar. None of them knows 
 - ``blotched``: the same for tones averaged over about 20 pixels. It shows patches from places with other light.
 
 Exemplars differ more in these figures than ways do, so only ways of one exemplar are compared. Each figure is divided by
-its mean over the ways plus a floor. The floor is a value at which the fault is hardly visible. The score is the mean of
-the square roots.
+its mean over the ways plus a floor, below which the fault is hardly visible. The score is the mean of the square roots.
 Repetition is not a figure, because it does not agree with the eye.
 """
 
@@ -241,9 +240,10 @@ def filter_oriented(x: Floats, scales: tuple[int, ...]) -> Floats:
     margin = 16
     size = [fft.next_fast_len(n + 2 * margin) for n in x.shape]
     after = [n - m - margin for n, m in zip(size, x.shape, strict=True)]
-    padded = np.pad(x, [(margin, n) for n in after], mode="symmetric").astype(np.float32)
+    padded = np.pad(x, [(margin, n) for n in after], mode="symmetric").astype(np.float64)
     spectrum, inside = fft.fft2(padded), tuple(slice(margin, -n) for n in after)
-    return np.stack([np.abs(fft.ifft2(spectrum * one)[inside]) for one in make_filters(padded.shape, scales)])
+    found = (fft.ifft2(spectrum * one)[inside] for one in make_filters(padded.shape, scales))
+    return np.stack([np.abs(one).astype(np.float32) for one in found])
 
 
 def average(x: Floats, side: int) -> Floats:

@@ -11,7 +11,7 @@ user does not give the foreground, the points or a search of their own. The othe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,10 @@ from texrs.elements._known import measure_centres
 from texrs.elements._layout import Layout
 from texrs.elements._mask import Wrap
 from texrs.elements._separation import label_components, rank_pieces
-from texrs.exemplar.element_finder import Arrangement, find_elements
 from texrs.exemplar.shapes import mark_outlines
+
+if TYPE_CHECKING:
+    from texrs.exemplar.element_finder import Arrangement
 
 __all__ = ["FEWEST", "View", "choose_layout", "view_elements"]
 
@@ -136,6 +138,9 @@ def choose_layout(layouts: dict[Arrangement, float]) -> tuple[Layout, float]:
 
 def _find(guide: Floats, wrap: Wrap, seed: int, progress: Progress) -> _Found:
     """Return the elements of an image, across its periodic borders."""
+    # Import the finder only here, because it imports SciPy.
+    from texrs.exemplar.element_finder import find_elements
+
     margin = [int(MARGIN * n) * w for n, w in zip(guide.shape, wrap, strict=False)]
     around = np.pad(guide, [(m, m) for m in margin] + [(0, 0)], mode="wrap") if any(margin) else guide
     found = find_elements(around, seed=seed, progress=lambda stage, share: progress("propose", share))

@@ -24,7 +24,6 @@ from texrs.elements._options import Settings
 from texrs.elements._search import search_similar
 from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
-from texrs.exemplar.element_finder import find_elements
 from texrs.point_sets import spacing
 
 PLACES = 12
@@ -125,6 +124,9 @@ def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
 def _choose_layout(guide: Floats, mask: Bools | None, seed: int) -> tuple[Layout, float]:
     """Return the most likely layout and its confidence."""
     if mask is None:
+        # Import the finder only here, because it imports SciPy.
+        from texrs.exemplar.element_finder import find_elements
+
         return choose_layout(find_elements(guide, seed=seed).layouts)
     pieces, count = label_components(mask, (False, False))
     main = float(np.bincount(pieces.ravel())[1:].max(initial=0)) / max(float(mask.sum()), 1.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,12 @@ from texrs._show import brief
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.courses import Courses, find_courses
-from texrs.exemplar.element_finder import Arrangement, FoundElements, find_elements
 from texrs.exemplar.layers import Regions
 from texrs.exemplar.regularity import Lattice, find_lattice
 from texrs.exemplar.shapes import mark_outlines
+
+if TYPE_CHECKING:
+    from texrs.exemplar.element_finder import Arrangement, FoundElements
 
 __all__ = ["ElementOptions", "Kind", "Segmentation", "segment"]
 
@@ -50,7 +52,7 @@ class ElementOptions:
         Number of colour layers, 1 to 16, if whole layers move ("none"). If it is given, "auto" means "none". Fewer are
         used if the image has fewer colours. Default: 2.
     segmentation : {"auto", "components", "grid", "none"}
-        Elements that move. "components": the elements that `texrs.exemplar.find_elements` finds. "grid": jittered
+        Elements that move. "components": elements that are found, as separate areas. "grid": jittered
         cells of 1/6 of the side, for images without elements. "none": whole colour layers, as in the paper. "auto":
         the elements, or the grid if there are none or if they are the meshes of a net.
     labels : (H, W) array of int, or a list of one per exemplar, optional
@@ -143,7 +145,7 @@ class Segmentation:
     courses : Courses, optional
         Courses of the exemplar, if any. The exemplar does not repeat along them, so `lattice` is None in this case.
     layout : {"separate", "heap", "jointed", "net", "none"}, optional
-        Layout of the elements (`texrs.exemplar.find_elements`). None if they are not components.
+        Layout of the elements (`texrs.exemplar.element_finder`). None if they are not components.
 
     Examples
     --------
@@ -283,6 +285,9 @@ def segment(
     watch()
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
     if options.segmentation != "grid":
+        # Import the finder only here, because it imports SciPy.
+        from texrs.exemplar.element_finder import find_elements
+
         with answering(watch):
             found = find_elements(rgb)
         fault = find_fault(found)

@@ -266,7 +266,8 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     some = picked[np.linspace(0, len(picked) - 1, min(len(picked), OTHERS)).astype(np.intp)]
     far = sum((row[:, None] - row[None, some]) ** 2 for row in form.astype(np.float32))
     say = weight[np.searchsorted(picked, some)] + 0.05
-    like = (np.exp(-0.5 * far) * (far > 1e-9)) @ say / say.sum()
+    # A matrix product and the exponential in single precision depend on the processor.
+    like = np.einsum("ij,j->i", np.exp(-0.5 * far.astype(np.float64)) * (far > 1e-9), say) / say.sum()
     like = like / max(float(np.quantile(like[picked], 0.9)), 1e-6)
     # A usual shape overrules most of the evidence against a rare colour.
     mean = np.maximum(mean, 0) + np.minimum(mean, 0) * (1 - RARE * np.minimum(like, 1))

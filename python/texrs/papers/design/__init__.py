@@ -205,7 +205,7 @@ def design(
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``motion``: For each example: "move", "keep" or "stitch".
         - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial. 0 is
-          the best value of ``score`` and of the faults. The faults are missing regularity (``irregular``), fine and
+          best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and
           coarse lines that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine
           and coarse steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
           of `texrs.metrics.evaluate`.
