@@ -178,8 +178,8 @@ def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
         ({"allow_rotation": "no"}, "allow_rotation: must be True or False"),
         ({"strength": 1.5}, "strength"),
         ({"strength": "half"}, "strength"),
-        ({"use_cells": True, "method": "paper"}, "bends"),
-        ({"use_cells": True, "method": "preview"}, "bends"),
+        ({"use_cells": True, "method": "paper"}, "deforms"),
+        ({"use_cells": True, "method": "preview"}, "deforms"),
     ],
 )
 def test_wrong_options_are_told(options: Any, words: str) -> None:

@@ -187,8 +187,8 @@ def test_places_say_how_far_knots_and_lines_are() -> None:
     [
         (NET, {"use_nets": 1}, "use_nets: must be True or False"),
         (NET, {"use_nets": True, "use_cells": True}, "cannot be combined with use_cells"),
-        (NET, {"use_nets": True, "method": "paper"}, "use_nets: .*bends"),
-        (NET, {"use_nets": True, "method": "preview"}, "use_nets: .*bends"),
+        (NET, {"use_nets": True, "method": "paper"}, "use_nets: .*deforms"),
+        (NET, {"use_nets": True, "method": "preview"}, "use_nets: .*deforms"),
         (DOTS, {"use_nets": True}, "separate elements"),
         (replace(NET, points=NET.points[:4]), {"use_nets": True}, "six knots"),
         (replace(NET, points=NET.points[:6] / 20), {"use_nets": True}, "8 pixels"),
