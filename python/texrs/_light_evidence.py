@@ -1,8 +1,9 @@
 """Estimate the slowly changing light of an image, as far as there is evidence for it.
 
-An image is also brighter where it has more bright elements by chance, which is not light. Light extends over the whole
-image. It is modelled as a polynomial of the position, or as a sum of waves if the image is periodic. More terms are
-used only if they explain clearly more. The residuals of single squares measure how much terms would explain by chance.
+Parts of an image that have, by chance, more bright elements are also brighter, but this is not light. Light extends
+over the whole image. It is modelled as a polynomial of the position, or as a sum of waves if the image is periodic.
+More terms are used only if they explain clearly more. The residuals of single squares measure how much terms would
+explain by chance.
 """
 
 from __future__ import annotations
@@ -108,8 +109,8 @@ def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64],
 def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
     """Fit the factors of terms (n, rows * columns) to values (rows, columns) robustly, and return them with the error.
 
-    The error consists of the residual variance, and the number of independent values, which is smaller than the number
-    of values because neighbours are similar.
+    The error consists of two numbers: the residual variance and the number of independent values. There are fewer
+    independent values than values, because neighbours are similar.
     """
     seen, weight = values.ravel(), np.ones(values.size)
     factors: Array = np.zeros(len(terms))

@@ -1,7 +1,7 @@
 """Extension of a photographed plane beyond the image borders, in the same perspective.
 
-The area beyond the borders is a hole. It is filled by example, as in `texrs.remove`, from the plane in the image,
-which is given or found.
+The area beyond the borders is a hole. It is filled by example from the plane in the image, as in `texrs.remove`. The
+plane is given or found.
 """
 
 from __future__ import annotations

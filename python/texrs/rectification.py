@@ -41,9 +41,9 @@ LARGER = 8
 SHOWN = 640
 """Maximum side of the first flattened image, in pixels."""
 CELLS = 160
-"""Cells a side of the lattice that is searched for the largest rectangle."""
+"""Number of cells along each side of the lattice that is searched for the largest rectangle."""
 COURSES = 0.35
-"""Minimum agreement of edges in two perpendicular directions for the texture to be rotated until they are level."""
+"""Minimum agreement of edges in two perpendicular directions. Above it, the texture is rotated to level them."""
 
 
 @takes_materials("image")

@@ -95,8 +95,9 @@ class Shown(NamedTuple):
     distortion : (points) float32
         Deviation of the patch from the field at each point. The array is empty if all points have the same frame.
     table : (patches, K) int32
-        Data of each patch. They are the position of its centre relative to the first point, and the source coordinates
-        and the Jacobian there. Then follow the side in units of 1/4096 of a sample, and 1 for a rigid patch.
+        Data of each patch. The first values are the position of its centre relative to the first point, and the source
+        coordinates and the Jacobian there. The side in units of 1/4096 of a sample follows. The last value is 1 if the
+        patch is rigid.
 
     """
 

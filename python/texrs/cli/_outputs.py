@@ -125,7 +125,7 @@ class Command(TyperCommand):
                     formatter.write_dl(entries)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments. A negative number is a value, such as that of pixels, unless it follows an option."""
+        """Parse the arguments. A negative number is an argument, such as a pixel value, unless it follows an option."""
         before = ["", *args]
         shielded = [
             f" {a}" if NEGATIVE.fullmatch(a) and b[:1] != "-" else a for b, a in zip(before, args, strict=False)

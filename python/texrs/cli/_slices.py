@@ -189,7 +189,7 @@ def slice_command(
 
 
 def check_view(used: Options, options: dict[str, Any]) -> None:
-    """Check the requested view before the volume is read, which can take long."""
+    """Check the requested view before the volume is read, because reading can take a long time."""
     asked = {name: value for name, value in options.items() if name != "interpolation"}
     if used is BLOCK:
         check_cube(**asked)

@@ -14,7 +14,7 @@ from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
 FOUND = "found"
-"""Word in place of the values of a plane that texrs finds itself."""
+"""Word that replaces a value of a plane if texrs must find the value."""
 PLANE = "plane:"
 """Prefix of the words that describe a plane."""
 

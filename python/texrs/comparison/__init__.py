@@ -84,7 +84,7 @@ def compare(
     tasks : sequence of str
         Tasks from ``"more"``, ``"tile"`` and ``"hole"``. Default: all.
     side : int
-        Maximum side of the compared part of each image, its middle, in pixels; 48 to 1024. Default: 128.
+        Maximum side, in pixels, of the middle part of each image that is compared, 48 to 1024. Default: 128.
     size : int, optional
         Side of the larger textures in pixels, ``side`` to 2048. Default: 1.5 times ``side``.
     seed : int

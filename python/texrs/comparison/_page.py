@@ -150,7 +150,7 @@ def caption(method: str, figures: str = "") -> str:
 
 
 def table(rows: str) -> str:
-    """Return a table that scrolls sideways if it is too wide, also with the keyboard."""
+    """Return a table that can be scrolled sideways, also with the keyboard, if it is too wide."""
     return f'<div class="wide" tabindex="0"><table>{rows}</table></div>'
 
 

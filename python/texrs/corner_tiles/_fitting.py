@@ -1,4 +1,4 @@
-"""Search of tileable images for positions that fit the known part of a piece."""
+"""Search tileable images for positions that fit the known part of a piece."""
 
 from __future__ import annotations
 

@@ -358,7 +358,7 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
     from one side makes the image darken slowly and brighten quickly along rows or columns. Slopes weighted by their
     square, or by the square of the other slope, then do not sum to 0. For equally likely mirror images they would. If
     edges are oblique, the product of the slopes does not sum to 0. If edges have two oblique directions at right
-    angles, a similar product of fourth order does not.
+    angles, a similar product of fourth order does not sum to 0.
     """
     from scipy.ndimage import gaussian_filter
 

@@ -170,8 +170,8 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
     Raises
     ------
     InvalidInput
-        If the argument is not a function. Also when the field is evaluated, if the function fails or does not return
-        frames.
+        If the argument is not a function. Evaluating the field raises the error if the function fails or does not
+        return frames.
 
     Examples
     --------

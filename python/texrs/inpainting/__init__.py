@@ -149,8 +149,8 @@ def inpaint(
         - ``exemplar_measured``: The same for the exemplar.
         - ``replaced_outside``: Number of known pixels that changed.
         - ``patch_size``: Side of the patches, in pixels.
-        - ``candidates``: Sides of patches that were tried, each with the cost of its seams. For volumes, with the step at the
-          border of the hole; 1 is the step elsewhere.
+        - ``candidates``: Sides of patches that were tried, each with the cost of its seams. For volumes, the cost is
+          the step at the border of the hole, relative to steps elsewhere.
         - ``patches``: Number of patches.
         - ``allow_mirror``: Whether patches could be mirrored.
         - ``screening``: Weight of the values in the colour correction.

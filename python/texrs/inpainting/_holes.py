@@ -162,7 +162,7 @@ def look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -
 
 
 def paint_over(picture: Array, open_: Bools) -> Array:
-    """Fill holes with the nearest known colours, which windows at their boundary are compared with."""
+    """Fill holes with the nearest known colours, so that windows at the boundary of holes can be compared."""
     from scipy.ndimage import distance_transform_edt
 
     if not open_.any():

@@ -209,7 +209,7 @@ def map_untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
 
 
 def guide_together(pictures: Sequence[Array]) -> list[Floats]:
-    """Return the colours of both images that patches are compared by, scaled together to [0, 1]."""
+    """Return the colours of each image for comparing patches. All images are scaled together to [0, 1]."""
     pixels = [as_image(p) for p in pictures]
     if len(pixels) == 1:
         return [guidance(pixels[0])]

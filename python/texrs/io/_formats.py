@@ -158,7 +158,7 @@ def check_spacing(spacing: Sequence[float]) -> tuple[float, ...]:
 
 
 def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
-    """Return the array without its alpha channel if that is opaque and the format cannot store it."""
+    """Return the array without its alpha channel if the channel is opaque and the format cannot store it."""
     channels = array.shape[axes] if array.ndim > axes else 1
     if channels not in (2, 4) or channels in form.channels or channels - 1 not in form.channels:
         return array

@@ -110,9 +110,9 @@ def inpaint(
         instead of a higher weight near the hole. The exact best matches are compared, by plain cut costs. With
         ``count=1`` this is their completion. Default: False.
     shown : int, optional
-        Index in ``index`` of the exemplar that is this image itself, if there is one. Surroundings of a hole are then
-        not copied or mirrored into it from there. Patches never repeat their neighbours, and mirror images in
-        ``index`` are recognised. Default: None.
+        Index in ``index`` of the exemplar that is this image itself, if there is one. The surroundings of a hole are
+        then not copied or mirrored into the hole from this exemplar. Patches never repeat their neighbours, and mirror
+        images in ``index`` are recognised. Default: None.
     progress : callable, optional
         Function that is called with the filled fraction of the holes, 0 to 1. An exception that it raises stops the
         work. Default: None.

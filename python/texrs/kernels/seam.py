@@ -125,11 +125,11 @@ def cut(
 ) -> Cut:
     """Find the least visible seam between two overlapping images, by an exact minimum cut [1]_.
 
-    Pixels that only one image covers take that image. The cores are hard constraints: their pixels take the image of
-    the core. Next, neighbours of pixels that only A covers take A, and then neighbours of pixels that only B covers
-    take B. The other pixels are chosen so that the sum of the costs of all separated pairs of neighbours is minimal.
-    If several choices are minimal, the choice with the fewest pixels of B is returned. If no pixel is constrained to
-    B, no pixel takes B.
+    Pixels that only one image covers take that image. The cores are hard constraints: pixels of ``core_a`` take A, and
+    pixels of ``core_b`` take B. Next, neighbours of pixels that only A covers take A, and then neighbours of pixels
+    that only B covers take B. The other pixels are chosen so that the sum of the costs of all separated pairs of
+    neighbours is minimal. If several choices are minimal, the choice with the fewest pixels of B is returned. If no
+    pixel is constrained to B, no pixel takes B.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def cut(
     mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
         Masks of the pixels that A and B cover.
     core_a, core_b : array_like of bool, optional
-        Masks, of the masks' shape, of the pixels that must keep A or take B. Each core must be inside the mask of its
-        image. Default: none.
+        Pixels that must keep A, and pixels that must take B, as arrays of the masks' shape. Each core must be inside
+        the mask of its image. Default: none.
     penalty : float or array_like of float, optional
         Penalty of each pixel, at least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean
         penalty of its two pixels. Penalties keep seams out of elements that should stay whole. Default: none.

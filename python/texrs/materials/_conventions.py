@@ -251,7 +251,7 @@ def guess_roles(stems: Sequence[str]) -> tuple[dict[str, Role], dict[str, str]]:
 
 
 def report_guesses(why: Mapping[str, str], roles: Mapping[str, Role], said: Collection[str]) -> None:
-    """Report the roles that depend on more than one name, except roles that the caller states."""
+    """Report the uncertain roles and the reasons for them, except roles that the caller states."""
     for name, reason in why.items():
         if name not in said:
             assume(f"{name}: read as {roles[name].value} ({reason})")

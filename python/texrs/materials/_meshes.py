@@ -63,7 +63,7 @@ def make_plane(shape: Sequence[int], repeat: int) -> Mesh:
 
 
 def make_sphere(shape: Sequence[int], repeat: int) -> Mesh:
-    """Return a sphere that repeats an image from pole to pole, and around it so that the aspect ratio is about kept."""
+    """Return a sphere that repeats an image from pole to pole and around it, with about the same aspect ratio."""
     rows, columns = shape
     around = max(1, round(2 * repeat * rows / columns))
     down, right = np.meshgrid(np.linspace(0, 1, RINGS + 1), np.linspace(0, 1, 2 * RINGS + 1), indexing="ij")

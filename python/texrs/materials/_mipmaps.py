@@ -1,4 +1,4 @@
-"""Compute mipmaps: copies of a map, each with half the size of the one before.
+"""Compute mipmaps: copies of a map, each with half the size of the previous copy.
 
 Colours are averaged as linear light, weighted by opacity. Normals are averaged and normalised. Labels and masks are
 not averaged: one of their values is chosen.

@@ -286,7 +286,7 @@ def _spread(values: Array, there: NDArray[np.bool_]) -> Array:
 
 
 def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
-    """Return the number of voxels in a unit of a mesh for which its longest side shows `FINEST` exemplars."""
+    """Return the number of voxels per unit of a mesh. Its longest side then shows `FINEST` exemplars."""
     longest = float(np.ptp(vertices, axis=0).max())
     sides = [n * step for n, step in zip(texture.exemplar.shape, texture.spacing, strict=True)]
     return FINEST * max(sides) / max(longest, 1e-12)

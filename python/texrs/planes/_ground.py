@@ -33,7 +33,9 @@ BANDS = 1.0, 2.5
 COLOUR, CONTRAST = 0.02, 0.2
 """Minimum deviation that is assumed for colours, from 0 to 1, and for logarithms of contrast."""
 RANGE, PLAIN = np.array([1.0, 1.0, 1.0, 4.0, 4.0]), -5.0
-"""Range of colours and logarithms of contrast without a ground; and logarithm of the contrast of a smooth surface."""
+"""Ranges of three colours and two logarithms of contrast in images without a ground; and logarithm of the contrast of a
+smooth surface.
+"""
 LOOSE = 1.5
 """Maximum deviation within one ground, as a multiple of the minimum deviation."""
 POWER = 4

@@ -41,7 +41,7 @@ ASKEW = 0.12
 MOST = 1500
 """Maximum number of lines that are used. If there are more, the longest are used."""
 COUNTED, TOLD = 60.0, 300.0
-"""Length above which longer lines do not count more; and length that is worth one independent measurement.
+"""Length above which the weight of a line is constant; and length that counts as one independent measurement.
 
 Both in pixels.
 

@@ -20,7 +20,7 @@ COLOUR, DEPTH = 1.0, 1.0
 CELL = 8
 """Side of the square cells of the exemplar for which uses are counted, in pixels."""
 CALM, RUN = 64, 9
-"""Number of lines that are searched for a calm one, and length of the pieces of a line that are averaged, in pixels.
+"""Number of lines among which a calm line is chosen, and length in pixels of the pieces of a line that are averaged.
 """
 
 

@@ -15,7 +15,7 @@ from texrs.exemplar import Lattice
 SCALES = (1, 2, 4)
 """Sides in pixels of the blocks that are compared.
 
-A border can be invisible at one scale and a visible band at another one.
+A border can be invisible at one scale and a visible band at another scale.
 """
 WINDOW = 16
 """Number of blocks along the line that are averaged. The mean of a whole line would hide a short break."""

@@ -182,8 +182,8 @@ def perspective(
     Raises
     ------
     InvalidInput
-        If a map has another shape or scales that are not positive, or the exemplar is too small. Also if the exemplar
-        has none of the target's scales, or the result wraps but the target is not periodic.
+        If a map has another shape or scales that are not positive, or the exemplar is too small. This error is also
+        raised if the exemplar has none of the target's scales, or the result wraps but the target is not periodic.
     Cancelled
         If the work was stopped.
 

@@ -105,7 +105,7 @@ def solid(
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
         Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
-        ``axes=3`` states whether its values are labels and along which axes it is periodic, which are otherwise
+        ``axes=3`` states whether its values are labels, and along which axes it is periodic. For other types, both are
         measured.
     size : int or (planes, rows, columns)
         Size of the result in voxels. One number gives a cube.
@@ -184,7 +184,7 @@ def solid(
     ------
     InvalidInput
         If the exemplar is too small or not finite, or a field has another number of axes or is singular somewhere.
-        Also if constraints or maps have the wrong shape, or an option is out of its range.
+        The error is also raised if constraints or maps have the wrong shape, or an option is out of its range.
     LimitExceeded
         If the work would take more memory than allowed.
     Cancelled
@@ -254,7 +254,7 @@ def synthesize(
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
-        whether its values are labels and along which axes it is periodic, which are otherwise measured.
+        whether its values are labels, and along which axes it is periodic. For other types, both are measured.
     size : int or (int, int)
         Size of the result in pixels. One number gives a square.
     field : Field, str, array_like or path_like, optional
@@ -307,7 +307,7 @@ def synthesize(
     ------
     InvalidInput
         If the exemplar is too small or not finite, or a field has another number of axes or is singular somewhere.
-        Also if constraints or maps have the wrong shape, or an option is out of its range.
+        The error is also raised if constraints or maps have the wrong shape, or an option is out of its range.
     LimitExceeded
         If the work would take more memory than allowed.
     Cancelled

@@ -35,7 +35,7 @@ Side of the drawing in pixels above which cells are drawn smaller.
 LINE = 0.17
 """Width of the ramp next to an outline in the drawing of the joints, in cell sizes."""
 SEEN, HINTED, COVERED = 0.3, 0.05, 0.35
-"""Minimum share of a cell that is visible in one patch: to be placed at once, and to be placed later if it is complete.
+"""Minimum visible shares of a cell in one patch: for placing it at once, and for placing it later if it is complete.
 
 The last number is the maximum share of a placed cell that other cells cover.
 """

@@ -48,7 +48,7 @@ __all__ = ["has_knots", "is_net", "splice_nets"]
 Points = NDArray[np.float64]
 
 SURE = 0.5
-"""Minimum confidence of the layout for a connected texture without cells to count as a net."""
+"""Minimum confidence of the layout, if a connected texture without cells is treated as a net."""
 FEWEST = 6
 """Minimum number of knots. Fewer knots would repeat visibly."""
 LEAST = 8.0
