@@ -20,7 +20,7 @@ from texrs._typing import Array, Bools, Floats
 BLOCKS = 32
 """Number of squares along the shorter side. The light is fitted to their means."""
 FULL = 0.25
-"""Minimum fraction of known pixels for a square to be used."""
+"""Minimum fraction of known pixels in a square that is used."""
 FEWEST = 24
 """Minimum number of squares for a fit."""
 BETTER = 0.75

@@ -24,7 +24,7 @@ _ASKED: ContextVar[Callable[[], object] | None] = ContextVar("asked", default=No
 
 @contextmanager
 def answering(progress: Callable[..., object] | None, *place: str | float) -> Iterator[None]:
-    """Let calls of `ask` in a ``with`` block reach a progress function.
+    """Pass the calls of `ask` in a ``with`` block to a progress function.
 
     Parameters
     ----------

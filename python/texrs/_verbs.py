@@ -33,7 +33,7 @@ def takes_materials(
     analysed: bool = False,
     check: Callable[[dict[str, Any]], None] = lambda given: None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a verb take materials as examples. The verb decides from their guide images, and all maps follow the result.
+    """Make a verb accept materials as examples. It decides from their guide images, and all maps follow the result.
 
     Parameters
     ----------

@@ -242,7 +242,7 @@ def _measure_traits(exemplar: Exemplar, elements: ElementOptions) -> _Traits:
 
 
 def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
-    """Return how conspicuous each cell is.
+    """Return the conspicuousness of each cell.
 
     The value is the deviation of a cell's mean colour and contrast from the medians of all cells, in standard
     deviations. If there are elements, the background has a low weight, because its repetition is not noticed.

@@ -119,7 +119,7 @@ def run_embark(more: bool, program: str, asked: Request) -> Array:
 
 
 def run_resynthesizer(program: str, asked: Request) -> Array:
-    """Let the Resynthesizer's engine fill a hole: PROGRAM IMAGE.ppm MASK.pgm OUT.ppm. Pixels of the hole are 255."""
+    """Fill a hole with the engine of Resynthesizer: PROGRAM IMAGE.ppm MASK.pgm OUT.ppm. Pixels of the hole are 255."""
     from imageio.v3 import imread
 
     assert asked.hole is not None
@@ -133,21 +133,21 @@ def run_resynthesizer(program: str, asked: Request) -> Array:
 
 
 def blend_borders(module: Any, asked: Request) -> Array:
-    """Let img2texture blend the opposite borders."""
+    """Blend the opposite borders with img2texture."""
     from PIL import Image
 
     return np.asarray(module.image_to_seamless(Image.fromarray(asked.picture), overlap=0.2).convert("RGB"))
 
 
 def continue_colours(flag: str, cv2: Any, asked: Request) -> Array:
-    """Let OpenCV continue the colours at the border of the hole inwards."""
+    """Continue the colours at the border of the hole inwards, with OpenCV."""
     assert asked.hole is not None
     made: Array = cv2.inpaint(asked.picture, asked.hole.astype(np.uint8), 5, getattr(cv2, flag))
     return made
 
 
 def shift_maps(cv2: Any, asked: Request) -> Array:
-    """Let OpenCV's contributed module copy shifted pieces."""
+    """Fill the hole with shifted pieces of the image, with the contributed modules of OpenCV."""
     assert asked.hole is not None
     made, known = np.zeros_like(asked.picture), np.where(asked.hole, 0, 255).astype(np.uint8)
     cv2.xphoto.inpaint(cv2.cvtColor(asked.picture, cv2.COLOR_RGB2Lab), known, made, cv2.xphoto.INPAINT_SHIFTMAP)
@@ -156,14 +156,14 @@ def shift_maps(cv2: Any, asked: Request) -> Array:
 
 
 def match_patches(module: Any, asked: Request) -> Array:
-    """Let PyPatchMatch fill the hole."""
+    """Fill the hole with PyPatchMatch."""
     assert asked.hole is not None
     made: Array = np.asarray(module.inpaint(asked.picture, asked.hole.astype(np.uint8) * 255, patch_size=5))
     return made
 
 
 def smooth(asked: Request) -> Array:
-    """Let scikit-image find the smoothest surface over the hole."""
+    """Fill the hole with the smoothest surface, with scikit-image."""
     from skimage.restoration import inpaint_biharmonic
 
     made = np.clip(inpaint_biharmonic(asked.picture, asked.hole, channel_axis=-1), 0, 1)

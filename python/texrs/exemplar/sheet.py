@@ -72,7 +72,7 @@ A map contains areas if its residual as areas is below this factor times its res
 BANDS = 8
 """Number of ranges of scales for comparing the steepness of edges."""
 PLANAR = 0.02
-"""Maximum residual of a target for which sizes change along one line, as on a plane."""
+"""Maximum residual of a target whose sizes change along one line, as on a plane."""
 ALIGNED = 0.8
 """Minimum cosine of the angle between this line and the slope of the exemplar.
 

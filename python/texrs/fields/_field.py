@@ -404,8 +404,8 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
     Raises
     ------
     InvalidInput
-        If the argument is not a field, or has another number of axes. This error is also raised if a frame is singular
-        at one of up to 32768 voxels that are spread evenly over the box, including its corners.
+        If the argument is not a field, or has another number of axes. This error is also raised if a frame is
+        singular. Up to 32768 voxels, spread evenly over the box, are checked, including its corners.
 
     Examples
     --------

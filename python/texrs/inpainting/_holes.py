@@ -54,7 +54,7 @@ def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) ->
 
 
 def check_material(given: dict[str, Any]) -> None:
-    """Refuse a hole that is defined by the values of one image if there are several maps."""
+    """Raise an error if a hole is defined by the values of an image and there are several maps."""
     marks = as_marks(given.get("mask")).marks
     if _is_alpha(marks) or is_value(marks):
         raise InvalidInput("mask: must be a mask image for a material, because the same hole applies to all its maps")

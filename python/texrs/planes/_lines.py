@@ -43,7 +43,7 @@ MOST = 1500
 COUNTED, TOLD = 60.0, 300.0
 """Length above which the weight of a line is constant; and length that counts as one independent measurement.
 
-Both in pixels.
+Both lengths are in pixels.
 
 The second length is larger because adjacent lines are not independent.
 """

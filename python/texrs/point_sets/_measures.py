@@ -23,9 +23,9 @@ PEAK, CLEAR = 1.3, 6.0
 Minimum difference from the median, in robust standard deviations.
 """
 FINE, COARSE = 0.15, 0.8
-"""Standard deviations, in spacings, of the Gaussians that points are drawn with.
+"""Standard deviations, in spacings, of the Gaussians with which points are drawn.
 
-Rows of points are visible with the first, the outline of all points with both.
+Rows of points are visible with the first Gaussian, and the outline of all points with both.
 """
 FEW = 4096
 """Maximum number of pairs for which all distances are computed directly."""

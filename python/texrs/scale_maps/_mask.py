@@ -200,7 +200,7 @@ def _count_outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
 
 
 def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
-    """Put 2 at the centre of each feature, or 1 if the border or a hole cuts it.
+    """Set 2 at the centre of each feature, or 1 if the border or a hole cuts the feature.
 
     A cut feature counts half, because about half of these features have their centre on the other side.
     """

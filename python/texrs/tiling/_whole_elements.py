@@ -14,7 +14,7 @@ from texrs.tiling._joints import make_levels
 REACH = 3.0
 """Distance from the outline where the depth inside an element becomes 1, in pixels of the coarsest level."""
 CLOSE = 0.5
-"""Minimum share of the image that close elements on a lattice cover, such as bricks.
+"""Minimum share of the image that close elements on a lattice, such as bricks, cover.
 
 Seams are not kept out of such elements.
 """

@@ -19,8 +19,8 @@ __all__ = ["Viewer"]
 class Viewer:
     """Interactive view of a volume in a notebook, with a slice and a slider for each axis.
 
-    The view needs only a browser, without a kernel or a network. The page has at most about 1 MB, so for large volumes
-    only every second voxel or fewer are shown. Notebooks show results, exemplars and samples of volumes in this way.
+    The view needs only a browser, without a kernel or a network. The page has at most about 1 MB, so large volumes are
+    shown at a lower resolution. Notebooks show results, exemplars and samples of volumes in this way.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ EDGE = 2.0
 Joints are lines, which the correction would fray.
 """
 SMALLEST = 24.0
-"""Minimum size of cells for a correction, in pixels. Windows in smaller cells contain more joint than cell."""
+"""Minimum size of cells for a correction, in pixels. Windows in smaller cells contain more joints than cells."""
 GRAIN, FINE = 0.24, 2.0
 """Minimum share of fine detail in the variance inside cells.
 
@@ -40,7 +40,7 @@ The second number is the standard deviation of the filter that removes fine deta
 Smooth cells, and cells with a single figure such as a honeycomb's bottom, look better stretched than corrected.
 """
 LEAST = 0.01
-"""Minimum share of stretched output pixels for a correction."""
+"""Minimum share of stretched output pixels. With fewer, the result is not corrected."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

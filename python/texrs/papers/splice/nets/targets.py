@@ -20,7 +20,7 @@ __all__ = ["Targets", "interpolate_layouts", "take_own_points", "take_points"]
 Points = NDArray[np.float64]
 
 AROUND = 1.5
-"""Width of the margin around the output with targets, in spacings, because lines from there reach into the output."""
+"""Width, in spacings, of the margin around the output that has targets. Lines from there reach into the output."""
 ROOM = 0.75
 """Minimum median distance of targets, as a share of the distance between A's knots."""
 FEWEST = 6
