@@ -317,8 +317,8 @@ def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, 
     """Return masks of the pairs with a broken crossing line, and of the pairs with any line.
 
     A line crosses a seam if there is a strong gradient along the seam. It is broken if the other side does not have a
-    similar gradient, at most a pixel aside. An edge along the seam on one side is an exception, because an element
-    ends there, and the line continues hidden below the element.
+    similar gradient within one pixel. An edge along the seam on one side is an exception, because an element ends
+    there, and the line continues hidden below the element.
     """
     ends = np.zeros(seams[0].source.shape, bool)
     for seam in seams:

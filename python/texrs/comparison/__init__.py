@@ -90,8 +90,7 @@ def compare(
     seed : int
         Seed of all methods that have one. Default: 0.
     programs : mapping of str to path, optional
-        Paths of programs, ``"embark"`` or ``"resynthesizer"``, that have another name than usual or are not in the
-        path.
+        Paths of the programs ``"embark"`` and ``"resynthesizer"``, if they have unusual names or are not in the path.
     timed : bool
         If True, the page reports the time of each method. If False, the same methods give the same bytes. Default:
         True.

@@ -141,7 +141,7 @@ class Grown:
     places : (points * A) int32
         Source coordinates, in units of 1/4096 of a sample.
     levels : tuple of LevelDone
-        Work done at each level, from the first one on.
+        Work done at each level, starting with the first level.
     stages : mapping of str to array
         Images of the start and of each level except the last, whose image is the result.
     patches : Patches, optional

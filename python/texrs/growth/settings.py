@@ -22,7 +22,8 @@ class Settings:
     weights : (float, float, float)
         Weight of the requested scales compared with similarity to the exemplar.
     radii : sequence of int
-        Radii of the exemplar's windows, from the coarsest level on. The last radius is used for all later levels.
+        Radii of the exemplar's windows, starting with the coarsest level. The last radius is used for all later
+        levels.
     coarsest : int
         Minimum side of the exemplar at the coarsest level, in samples.
     cell, rounds, candidates : int

@@ -26,7 +26,7 @@ class Windows:
     Attributes
     ----------
     levels : tuple of Appearance
-        Levels of the exemplar, from the coarsest on.
+        Levels of the exemplar, starting with the coarsest.
     settings : Settings
         Settings of the engine.
     seed : int
@@ -107,7 +107,7 @@ class Windows:
         first: int = 0,
         passes: int | None = None,
     ) -> Corrected:
-        """Correct the source coordinates of a level by comparing windows, in passes from the number ``first`` on."""
+        """Correct the source coordinates of a level by comparing windows, beginning with pass ``first``."""
         here, step, s = self.levels[level], self.step(level), self.settings
         wanted = step.passes if passes is None else passes
         advance = stage(progress, f"level {level + 1} of {len(self.levels)}")

@@ -350,7 +350,7 @@ def stitch(
 def correct_seams(
     composite: Array, hole: Bools, new: Bools, places: NDArray[np.intp], weight: float, watch: Progress
 ) -> Array:
-    """Return a volume whose replaced voxels differ from their neighbours as in the places that they are copied from.
+    """Return a volume whose replaced voxels differ from their neighbours by the same amounts as in their sources.
 
     The values x minimise ``sum((x[q] - x[p] - g[p, q]) ** 2) + weight * sum((x - composite) ** 2)`` over pairs of neighbours.
     The requested difference g of a pair is its difference at the source.

@@ -22,7 +22,7 @@ def __dir__() -> list[str]:
 
 
 class TextureAugment(DualTransform):  # type: ignore[misc]
-    """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of albumentations.
+    """Augment images, masks and boxes by rearranging their pieces, in a pipeline of albumentations.
 
     The pipeline's own generator draws the seeds, so ``Compose(..., seed=...)`` determines the samples. Each worker
     process has a copy of this generator in the same state. The seed also depends on the name of the process, which

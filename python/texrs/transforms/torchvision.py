@@ -23,7 +23,7 @@ def __dir__() -> list[str]:
 
 
 class TextureAugment(v2.Transform):  # type: ignore[misc]
-    """Rearrange images, masks and boxes from pieces of themselves, in a pipeline of torchvision.
+    """Augment images, masks and boxes by rearranging their pieces, in a pipeline of torchvision.
 
     Torch's generator draws the seeds. `torch.manual_seed`, and the seed that a loader gives each worker, therefore
     determine the samples. If a sample is a dictionary with a plain tensor ``"labels"`` of the length of the boxes, the
