@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from texrs._arrays import as_image, as_rgb, as_seed, to_unit
 from texrs._cache import Cache, content_hash
@@ -204,10 +205,11 @@ def reduce(rgb: Floats) -> Floats:
 def measure_elements(labels: Labels, choice: Choice, overlaps: tuple[Overlap, ...]) -> tuple[Element, ...]:
     """Return the measures of all elements."""
     count = len(choice.chosen)
-    flat = labels.ravel()
-    y, x = (np.broadcast_to(axis, labels.shape).ravel() for axis in np.ogrid[: labels.shape[0], : labels.shape[1]])
-    area = np.bincount(flat, minlength=count + 1)[1:]
-    rows, columns = (np.bincount(flat, axis, count + 1)[1:] / np.maximum(area, 1) for axis in (y, x))
+    area, rows, columns = np.zeros(count, int), np.zeros(count), np.zeros(count)
+    for i, box in enumerate(ndimage.find_objects(labels, count)):
+        if box is not None:
+            y, x = np.nonzero(labels[box] == i + 1)
+            area[i], rows[i], columns[i] = len(y), box[0].start + y.mean(), box[1].start + x.mean()
     usual = float(np.median(area[area > 0])) if area.any() else 1.0
     border = np.zeros(count + 1, bool)
     for line in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):

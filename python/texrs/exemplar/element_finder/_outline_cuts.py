@@ -30,14 +30,13 @@ SHARP = 3.0
 """How fast the price falls with the contrast. 2 to 4 gave the same IoU within 0.005."""
 SOFT = 0.7
 """Standard deviation of the blur before the contrast, in pixels. With 1.5 the mean IoU is 0.02 lower."""
+STRIP = 128
+"""Number of rows that are processed at once. It has no influence on the result."""
 
 
 def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
     """Return labels at the size of `rgb` whose outlines lie on contours. `labels` are at the reduced size."""
-    evidence = weigh_words(labels, contours)
     shape = rgb.shape[0], rgb.shape[1]
-    if labels.shape != shape:
-        labels, evidence = enlarge(labels, shape), enlarge(evidence, shape)
     contrast = measure_contrast(rgb, max(1.0, max(shape) / max(contours.words.shape)))
     price = contrast
     price *= SHARP
@@ -45,6 +44,9 @@ def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
     price += 1
     np.reciprocal(price, out=price)
     price += CLEAREST
+    evidence = weigh_words(labels, contours)
+    if labels.shape != shape:
+        labels, evidence = enlarge(labels, shape), enlarge(evidence, shape)
     side = np.sqrt(np.bincount(labels.ravel(), minlength=int(labels.max()) + 1))
     reach = np.clip(np.rint(BAND * side), 1, 24).astype(np.uint8)
     reach[0] = 0
@@ -53,18 +55,21 @@ def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
 
 def measure_contrast(rgb: Floats, factor: float) -> Floats:
     """Return the slope of lightness and of two opponent colours, about 1 where it is steep."""
-    red, green, blue = (rgb[..., i] for i in range(3))
-    total = np.zeros(red.shape, np.float32)
-    # About the scales of L*, a* and b* for colours between the primaries.
-    for channel in (30 * red + 59 * green + 11 * blue, 70 * (red - green), 35 * (red + green) - 70 * blue):
-        soft = blur(channel, SOFT * np.sqrt(factor))
-        for axis in (0, 1):
-            if soft.shape[axis] > 2:
-                step = np.zeros_like(soft)
-                first, last = ((slice(None),) * axis + (cut,) for cut in (slice(2, None), slice(None, -2)))
-                step[(slice(None),) * axis + (slice(1, -1),)] = 0.5 * (soft[first] - soft[last])
-                total += np.square(step, out=step)
-    np.sqrt(total, out=total)
+    total = np.zeros(rgb.shape[:2], np.float32)
+    sigma = SOFT * np.sqrt(factor)
+    # Work in strips to save memory. The margin is as wide as the reach of the blur and of the slope.
+    margin, count = int(3 * sigma + 0.5) + 1, len(rgb)
+    for start in range(0, count, STRIP):
+        low, high = max(start - margin, 0), min(start + STRIP + margin, count)
+        red, green, blue = (rgb[low:high, :, i] for i in range(3))
+        square = np.zeros(red.shape, np.float32)
+        # About the scales of L*, a* and b* for colours between the primaries.
+        for channel in (30 * red + 59 * green + 11 * blue, 70 * (red - green), 35 * (red + green) - 70 * blue):
+            soft = blur(channel, sigma)
+            square[1:-1] += np.square(0.5 * (soft[2:] - soft[:-2]))
+            square[:, 1:-1] += np.square(0.5 * (soft[:, 2:] - soft[:, :-2]))
+        stop = min(start + STRIP, count)
+        np.sqrt(square[start - low : stop - low], out=total[start:stop])
     # Every third pixel is enough for the quantile.
     total /= np.quantile(total[::3, ::3], 0.95) + 1.0
     return total

@@ -258,8 +258,12 @@ def measure_consensus(candidates: Candidates, chosen: NDArray[np.bool_], quality
     element = np.maximum(inside - mine, 0)
     other = np.maximum(everything - inside - (candidates.words - mine), 0)
     few = 0.01 * everything + 1
-    ratio = np.log((element + few) / max(inside.sum(), 1)) - np.log((other + few) / max((everything - inside).sum(), 1))
-    mean = (np.clip(ratio, -2, 2) * candidates.words).sum(1) / candidates.features["area"]
+    element += few
+    other += few
+    element /= other
+    element *= max((everything - inside).sum(), 1) / max(inside.sum(), 1)
+    ratio = np.clip(np.log(element, out=element), -2, 2, out=element)
+    mean = np.einsum("ij,ij->i", ratio, candidates.words) / candidates.features["area"]
     f = candidates.features
     # Four numbers of shape, in units of their usual differences between elements of one kind.
     form = np.stack([2 * np.log(f["area"]), 3.3 * np.log(f["elongation"]), f["solid"] / 0.08, f["ellipse"] / 0.08])
