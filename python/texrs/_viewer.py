@@ -79,7 +79,7 @@ for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
 def as_page(volume: Array) -> str:
     """Return HTML that shows a volume (D, H, W, C), with at most about a million characters.
 
-    Only every second voxel or fewer of larger volumes are shown.
+    Larger volumes are shown at a lower resolution.
 
     Examples
     --------

@@ -76,8 +76,8 @@ def extend(
         Weight of the original values in the colour correction of the added pixels, as in `texrs.inpaint`. None or 0:
         no correction. Default: 0.1.
     match_lighting : bool
-        If True, the added pixels follow gradual changes of light, such as towards a window. Beyond the photograph the
-        light stays as at the border. Default: True.
+        If True, the added pixels follow gradual changes of light, such as towards a window. Beyond the photograph, the
+        light is the same as at the border. Default: True.
     seed : int
         Seed of the random choices. Default: 0.
     progress : callable or True, optional
@@ -94,8 +94,8 @@ def extend(
         Stages:
 
         - ``known``: The image with the marked part in one colour.
-        - ``ground``: Each plane in a shade of its own.
-        - ``patches``: Each patch in a shade of its own.
+        - ``ground``: The planes, each in its own shade.
+        - ``patches``: The patches, each in its own shade.
         - ``before_blending``: The result before colours are corrected.
 
         Report:

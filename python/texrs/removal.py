@@ -97,8 +97,8 @@ def remove(
         Stages:
 
         - ``known``: The image with the marked part in one colour.
-        - ``ground``: Each plane in a shade of its own.
-        - ``patches``: Each patch in a shade of its own.
+        - ``ground``: The planes, each in its own shade.
+        - ``patches``: The patches, each in its own shade.
         - ``before_blending``: The result before colours are corrected.
 
         Report:

@@ -202,7 +202,7 @@ class Stitcher:
             Number of source positions that are tried for each patch, 1 to 64. The position with the cheapest seam is
             used.
         bend : bool
-            If True, patches bend with the field. Otherwise they are rotated and scaled as a whole.
+            If True, patches are bent along the field. Otherwise they are rotated and scaled as a whole.
         recover : float
             Number of patches that replace the worst seams, as a share of all patches, 0 to 4. They are used if they
             lower the cost.

@@ -61,7 +61,7 @@ CELL = 256
 NOT_ONE = ("batch", "rerun", "info", "demo", "samples", "database")
 """Commands that a batch cannot run, because they do not write one result from input files."""
 THERE, MADE = "is there", "wrote"
-"""States of a successful job: its result existed, or was written now. Any other text is the reason of a failure."""
+"""States of a successful job: its result existed, or was written now. Any other text is the reason for a failure."""
 
 
 @dataclass(frozen=True, slots=True)

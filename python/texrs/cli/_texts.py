@@ -93,7 +93,7 @@ def parse_spacing(text: str, about: About) -> tuple[float, ...]:
 
 
 def parse_range(text: str, about: About) -> tuple[float, float]:
-    """Convert ``0.8:1.2`` to (minimum, maximum). A single number is both."""
+    """Convert ``0.8:1.2`` to (minimum, maximum). A single number is used for both."""
     numbers = parse_numbers(text, about.option, "LEAST:LARGEST, as in 0.8:1.2", counts=(1, 2))
     return numbers[0], numbers[-1]
 

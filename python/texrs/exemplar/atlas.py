@@ -265,7 +265,7 @@ def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
 def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
     """Fill the gaps between copies with colours of the first copy.
 
-    A constant colour in the gaps would count as texture.
+    Gaps of a constant colour would be analysed as a part of the texture.
     """
     empty = np.ones(packed.shape[:2], bool)
     for copy in copies:

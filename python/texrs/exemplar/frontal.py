@@ -63,7 +63,10 @@ class Frontal(Copies):
         return {"kind": "front", "resolution": round(float(np.sqrt(np.prod(self.copies[0].factor))), 5)}
 
     def side(self, target: Floats) -> float:
-        """Return the side of a patch in samples, as a share of the sheet's side. Patches bend with the surface."""
+        """Return the side of a patch in samples, as a share of the sheet's side.
+
+        The side does not depend on ``target``, because patches are warped to follow the surface.
+        """
         return FLAT * float(np.sqrt(self.free.size))
 
     def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:

@@ -78,7 +78,7 @@ class Patches:
     frames : (patches, A, A) float32
         Jacobian at the centre of each patch.
     bent : bool
-        If True, the patches bend with the field. If False, they are rotated and scaled as a whole.
+        If True, the patches are bent along the field. If False, they are rotated and scaled as a whole.
     seams : float
         Mean cost of the seams per point.
     healed : int

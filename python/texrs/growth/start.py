@@ -37,7 +37,7 @@ GUIDED = 0.4
 Patches are smaller because the exemplar's own trend continues within a patch.
 """
 DIRECTED = 0.3
-"""Minimum agreement in direction of an exemplar's edges, 0 to 1, above which its patches bend with a field."""
+"""Minimum agreement in direction of an exemplar's edges, 0 to 1, above which its patches are bent along a field."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """Costs of seams for separate elements, and for exemplars without known elements."""
 GUESSED = Weights(surprise=0.5, contact=0.0, joint=0.0, jump=0.0, depth=0.15, presence=0.0)
@@ -72,8 +72,8 @@ def from_patches(
     candidates : int
         Number of source positions that are tried for each patch. The best one is used.
     bend : bool, optional
-        If True, patches bend with a field. Default: True if the exemplar's edges have a direction and its elements are
-        not separate.
+        If True, patches are bent along a field. Default: True if the exemplar's edges have a direction and its
+        elements are not separate.
     larger : float
         Factor that multiplies the usual side of the patches. Default: 1.
     plain : bool

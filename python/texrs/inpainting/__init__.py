@@ -136,7 +136,7 @@ def inpaint(
         Stages:
 
         - ``known``: The image, with its hole in one colour.
-        - ``patches``: Each patch in a shade of its own.
+        - ``patches``: The patches, each in its own shade.
         - ``before_blending``: The result before colours are corrected.
 
         Report:

@@ -139,7 +139,7 @@ def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | No
     Parameters
     ----------
     path : path_like
-        Archive of arrays of numbers, as written by `numpy.savez`. Python objects are an error.
+        Archive of arrays of numbers, as written by `numpy.savez`. Arrays of Python objects raise an error.
     limit : int, optional
         Maximum number of pixels of an array. The maximum number of bytes of all arrays is 16 times this number.
         Default: as `texrs.limits` allows.

@@ -292,7 +292,7 @@ def orientation_errors(
     step: int = 1,
     spacing: Sequence[float] | None = None,
 ) -> Floats:
-    """Return the angles between the layers of a texture and their expected direction under a field.
+    """Return the angles between the layers of a texture and their expected direction in a field.
 
     The actual normal is the main direction of the structure tensor (gradients of a Gaussian of sigma 1 pixel, averaged
     with a Gaussian of sigma 4). The expected normal is J^T n, where n is the exemplar's normal and J the Jacobian of

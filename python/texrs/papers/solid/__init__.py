@@ -99,7 +99,7 @@ def solid(
     memory_limit: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Synthesise a volume from an example volume, under a frame field.
+    """Synthesise a volume from an example volume. The texture can follow a frame field.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def solid(
         "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
         for textures without elements. Default: "preserve".
     bend_patches : bool, optional
-        If True, patches bend with the field, which suits courses and nets. If False, they are rotated and scaled as a
-        whole, which suits separate elements. Default: False if the exemplar has separate elements.
+        If True, patches are bent along the field, which suits courses and nets. If False, they are rotated and scaled
+        as a whole, which suits separate elements. Default: False if the exemplar has separate elements.
     method : {None, "paper", "paper-compensated"}
         Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
         Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
@@ -248,7 +248,7 @@ def synthesize(
     memory_limit: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
-    """Synthesise an image from an example image, under a frame field.
+    """Synthesise an image from an example image. The texture can follow a frame field.
 
     Parameters
     ----------
@@ -270,8 +270,8 @@ def synthesize(
         "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
         for textures without elements. Default: "preserve".
     bend_patches : bool, optional
-        If True, patches bend with the field, which suits courses and nets. If False, they are rotated and scaled as a
-        whole, which suits separate elements. Default: False if the exemplar has separate elements.
+        If True, patches are bent along the field, which suits courses and nets. If False, they are rotated and scaled
+        as a whole, which suits separate elements. Default: False if the exemplar has separate elements.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements but copy
         larger parts. "unmasked": seams may cross elements. "unmasked-large": both. "auto": each method is tried twice

@@ -45,7 +45,7 @@ class Request:
     quality : {"preserve", "fast", "optimise"}
         Amount of work.
     bend_patches : bool, optional
-        If True, patches bend with the field. If None, the exemplar determines it.
+        If True, patches are bent along the field. If None, the exemplar determines it.
     patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
         Method of stitching.
     method : {None, "paper", "paper-compensated"}

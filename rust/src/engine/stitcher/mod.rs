@@ -62,7 +62,7 @@ pub struct Options {
     pub overlap: f32,
     /// Number of candidates that are tried for each patch. The candidate with the cheapest cut is kept.
     pub candidates: usize,
-    /// If true, patches bend with the field. Otherwise they are rotated and scaled as a whole.
+    /// If true, patches are bent along the field. Otherwise they are rotated and scaled as a whole.
     pub bend: bool,
     /// Weights of the seam costs.
     pub weights: Weights,
