@@ -72,7 +72,7 @@ def find_lightness(image: Array) -> Numbers:
 
 
 def measure_repetition(example: Array, made: Array) -> float:
-    """Return the similarity of an image to itself after a shift, beyond the similarity of its example."""
+    """Return how much more similar an image is to a shifted copy of itself than its example is, at least 0."""
     return max(0.0, find_echo(made) - max(0.0, find_echo(example)))
 
 

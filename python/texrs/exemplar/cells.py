@@ -335,7 +335,7 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
 
 
 def _find_threshold(relief: Floats) -> float:
-    """Return twice the joint strength that separates cells, so that 0.5 is the threshold after division by it."""
+    """Return the divisor of the joint strength after which the threshold between cells and joints is 0.5."""
     low, high = np.percentile(relief, (40, 90))
     return max(2 * float(low + PARTS * (high - low)), 1e-6)
 

@@ -31,7 +31,7 @@ def index_patches(
     free : (H, W) bool, optional
         Pixels that patches can contain. Default: all.
     like : PatchIndex, optional
-        Index of the same mirror images of the exemplar for another patch size, whose data are reused.
+        Index for another patch size, of the same mirror images of the exemplar. Its data are reused.
 
     """
     allowed = None if free is None else [mark_corners(flip(free, mirror), side) for mirror in mirrors]

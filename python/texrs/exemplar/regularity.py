@@ -58,7 +58,7 @@ Results are then the same on every processor.
 FARTHEST = 4096.0
 """Maximum length of listed shifts, in pixels."""
 LEANS = 3.0
-"""Divisor of the mirror measure for lattices with oblique axes, in standard errors, so that 3 count as one.
+"""Divisor of the mirror measure, in standard errors, for lattices with oblique axes.
 
 A wall photographed slightly obliquely has up to 10.
 """

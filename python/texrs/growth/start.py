@@ -111,9 +111,10 @@ def from_patches(
 
 
 def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bool:
-    """Return True if patches of an exemplar bend with a field.
+    """Return True if patches of an exemplar are bent along a field.
 
-    If ``bend`` is given, it decides. Otherwise patches bend if edges have a direction and elements are not separate.
+    If ``bend`` is given, it decides. Otherwise patches are bent if edges have a direction and elements are not
+    separate.
     """
     if bend is not None or not varies:
         return varies and bool(bend)

@@ -43,7 +43,7 @@ texrs[tiff]``. CMYK is converted to sRGB by the profile of the file. Frames and 
 Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five formats, which also keep the
 distances between voxels (`read_spacing`). In those five formats, the axes plane, row and column are called z, y and x,
 and x varies fastest in the file. Volumes larger than memory are written slab by slab (`write_slabs`), and surfaces as
-``.stl`` (`write_surface`). A dtype that a format cannot store is an error and is never converted. Bool arrays are
+``.stl`` (`write_surface`). A dtype that a format cannot store raises an error. It is never converted. Bool arrays are
 written as 0 and 255, but stay bool in ``.npy`` and ``.npz``. An opaque alpha channel is omitted if the format has
 none. An image of one channel is read without a channel axis, except from ``.npy`` and ``.npz``, which keep the shape.
 ``.npz`` files have the key ``image``.

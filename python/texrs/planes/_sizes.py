@@ -315,7 +315,7 @@ def shape_of(
     size: tuple[int, int],
     sure: float,
 ) -> ScaleEstimate:
-    """Return the map of the agreed sizes: a plane if it fits well enough, else a curved surface, else from masks."""
+    """Return the map of the agreed sizes: a plane if it fits well, else a curved surface, else the map from masks."""
     surface = fit(places, mean, size)
     every = tuple(np.indices(size).reshape(2, -1))
     curved = np.einsum("ni,i->n", list_terms((every[0], every[1]), size), surface).reshape(size)

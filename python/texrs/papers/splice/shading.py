@@ -46,7 +46,7 @@ class Light:
     share : float
         Share of the light that was removed from elements, 0 to 1.
     low, span : float
-        Value of the texture that is 0 in ``even``, and difference to the value that is 1.
+        Scale of ``even``: ``even * span + low`` has the values of the texture.
 
     """
 

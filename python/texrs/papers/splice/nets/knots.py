@@ -83,7 +83,7 @@ class Window:
     off : (h, w, 2) int
         Offset of each pixel from the target, in rows and columns.
     cell, core : (h, w) bool
-        True for pixels that the knot can cover, and for pixels that it must cover.
+        ``cell`` is True for pixels that the knot can cover, and ``core`` for pixels that it must cover.
 
     """
 
