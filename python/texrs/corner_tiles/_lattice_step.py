@@ -42,8 +42,7 @@ class Draw:
     """Equivalent positions to choose from. None allows all positions."""
 
     def __call__(self, row: int = 0, column: int = 0, which: int | None = None) -> tuple[int, int, int]:
-        """Choose a random image, or image ``which``, and a random position for content at this offset from a
-        corner."""
+        """Choose a random image, or image ``which``, and a position for content at this offset from a corner."""
         drawn = int(self.rng.integers(self.count))
         picture = drawn if which is None else which
         if self.step is None:

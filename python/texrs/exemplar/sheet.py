@@ -504,7 +504,7 @@ def measure_areas(frames: NDArray[np.float64]) -> NDArray[np.float64]:
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return products of matrices (..., 2, 2).
 
-    Written out, because the last bits of library functions depend on the processor.
+    The products are written out, because the last bits of library functions depend on the processor.
     """
     return np.asarray(a[..., :, :1] * b[..., :1, :] + a[..., :, 1:] * b[..., 1:, :], np.float64)
 

@@ -100,7 +100,7 @@ def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> S
 def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
     """Return the parts, and the regions outside them that continue behind them.
 
-    A sky or a wall surrounds a hole, or contains a corner of the image where a plane recedes from the camera. Floors
+    A sky or a wall surrounds a hole, or contains an image corner towards which a plane recedes from the camera. Floors
     recede upwards if their orientation is not known. An object on a plane, such as a cup on a table, is not such a
     region. Regions of different colours are different parts: a wall does not continue as the sky next to it.
     """

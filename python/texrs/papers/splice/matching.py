@@ -342,8 +342,7 @@ class Edit:
     listed : bool
         True if the edit only lists moved points.
     ruled : bool
-        True if the edit scales, shifts rows, randomises or regularises, because these steps ignore the sizes of
-        elements.
+        True if the edit scales, shifts rows, randomises or regularises. These steps ignore the sizes of elements.
     cyclic : (bool, bool)
         Axes along which the edited layout is periodic.
     shrink : float
