@@ -16,7 +16,7 @@ __all__ = ["Fit", "Pictures", "Place", "Places", "look_up"]
 APART = 32
 """Divisor of a tile's side that gives the minimum distance of candidates for a piece, along at least one axis."""
 SPARE = 8
-"""Factor for the number of candidates, because some are at positions that are already taken."""
+"""Factor that multiplies the number of candidates. Some candidates are at positions that are already taken."""
 AGAIN = 8
 """Divisor of a tile's side that gives the minimum distance from a taken position.
 

@@ -58,7 +58,7 @@ The terms are a constant, and factors of the rise and of the deviation of measur
 added.
 """
 SHARED = 0.5
-"""Minimum share of the bands' difference that remains after lines are used, because both bands use the same lines."""
+"""Minimum share of the bands' difference that remains after lines are used. Both bands use the same lines."""
 FEWEST = 20
 """Minimum number of lines. If there are fewer, lines are not used."""
 

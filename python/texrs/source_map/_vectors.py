@@ -35,7 +35,7 @@ def find_scale(dtype: np.dtype[Any], signed: bool) -> tuple[float, float]:
 
 
 def stores_z(exemplars: Sequence[Array]) -> bool:
-    """Return True if the third channel of a normal map is z, so that the vectors have unit length.
+    """Return True if the third channel of a normal map is z. The vectors then have unit length.
 
     The third channel is not z if it is missing, constant, or has other values. The z of unit vectors follows from x
     and y, so the channel must be closer to this z than a constant is.

@@ -24,7 +24,7 @@ Departures from the paper, with their reasons:
 - Both point sets continue beyond their images. They are reflected at lines where the layout continues regularly.
   Without this, a third of the output would be empty, and elements would be missing at its border.
 
-- There are more elements than targets, because the printed algorithm needs point sets of equal size. Elements without
+- There can be more elements than targets. The printed algorithm needs point sets of equal size. Here, elements without
   a target are erased. They shrink, and the background around them closes. Without this, a fifth of the output would be
   a hole.
 

@@ -25,7 +25,8 @@ __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 Points = NDArray[np.float64]
 
 MARGIN = 1.0
-"""Width of the margin around the output with target cells, in cell sizes, so that cells at the border are complete."""
+"""Width, in cell sizes, of the margin around the output that has target cells. Cells at the border are then
+complete."""
 SAMPLES = 640
 """Maximum number of samples along each axis for measuring the areas of Voronoi cells."""
 SLIVER = 0.2
