@@ -25,8 +25,7 @@ __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 Points = NDArray[np.float64]
 
 MARGIN = 1.0
-"""Width, in cell sizes, of the margin around the output that has target cells. Cells at the border are then
-complete."""
+"""Width, in cell sizes, of the margin with target cells. It makes cells at the border of the output complete."""
 SAMPLES = 640
 """Maximum number of samples along each axis for measuring the areas of Voronoi cells."""
 SLIVER = 0.2
