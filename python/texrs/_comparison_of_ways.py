@@ -11,7 +11,8 @@ Six figures are measured, each 0 for a crop of the exemplar. None of them knows 
 - ``blotched``: the same for tones averaged over about 20 pixels. It shows patches from places with other light.
 
 Exemplars differ more in these figures than ways do, so only ways of one exemplar are compared. Each figure is divided by
-its mean over the ways plus a floor, below which the fault is hardly visible. The score is the mean of the square roots.
+the sum of its mean over the ways and a floor. Below the floor, what the figure measures is hardly visible. The score is
+the mean of the square roots of these quotients.
 Repetition is not a figure, because it does not agree with the eye.
 """
 
@@ -186,7 +187,7 @@ def correlate(light: Floats, reach: tuple[int, int]) -> Floats:
 
 
 def find_peaks(light: Floats) -> tuple[NDArray[np.intp], Floats, tuple[int, int]]:
-    """Return the highest peaks of the autocorrelation: places and heights, and the largest shifts."""
+    """Return the places and heights of the highest peaks of the autocorrelation, and the search range along each axis."""
     from scipy.ndimage import maximum_filter
 
     rows, columns = (max(1, min(int(REACH * n), FAR)) for n in light.shape)

@@ -173,7 +173,10 @@ def keep_material(made: Synthesis, materials: Sequence[Material]) -> Synthesis:
 
 
 def _keeps(image: Array, indexed: bool) -> bool:
-    """Return True if results keep the colours of this image. An image with a palette of many greys is a photograph."""
+    """Return True if results keep the colours of this image.
+
+    An image with a palette of many greys counts as a photograph, whose colours are not kept.
+    """
     if not indexed or image.dtype != np.uint8:
         return has_few_colours(image)
     grey = image.ndim == 2 or (image.shape[2] >= 3 and bool((image[..., :3] == image[..., :1]).all()))

@@ -16,7 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
 LOOK = 2**22
-"""Maximum number of pixels of an image whose seams are measured. Exemplars are sampled at a quarter of this number."""
+"""Maximum number of pixels of an image whose seams are measured. For an exemplar, the maximum is a quarter of that."""
 
 
 @dataclass(frozen=True, slots=True)

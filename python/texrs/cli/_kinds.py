@@ -235,7 +235,11 @@ KINDS = {
     "points": Kind(
         "POINTS.csv", read_points, "Each line is x,y. A first line row,column states the other order.", file=True
     ),
-    "corrections": Kind("JSON|FILE.json", read_corrections, "They are on the page that texrs analyse --page writes."),
+    "corrections": Kind(
+        "JSON|FILE.json",
+        read_corrections,
+        "Make them by clicking on the page that texrs analyse --page writes, which lists them as JSON.",
+    ),
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, STEPS),
 }

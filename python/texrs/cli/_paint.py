@@ -55,8 +55,14 @@ PAINTED = Options(
 FOLLOWED = Options(
     field_on_surface,
     only=("directions", "along"),
-    kinds={"directions": Kind("AXIS|around:AXIS|curvature|FILE.json", lambda text, about: text)},
-    optional={"directions": "as the texture lies"},
+    kinds={
+        "directions": Kind(
+            "AXIS|around:AXIS|curvature|FILE.json",
+            lambda text, about: text,
+            "AXIS is x, y, z or three numbers such as 1,0,1.",
+        )
+    },
+    optional={"directions": "the texture is not rotated"},
 )
 
 

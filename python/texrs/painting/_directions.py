@@ -52,11 +52,11 @@ def field_on_surface(
     mesh : path_like, trimesh.Trimesh, or (vertices, faces)
         Mesh, as for `texture_mesh`.
     directions : str, or sequence
-        Directions on the surface. ``"x"``, ``"y"``, ``"z"`` or three numbers such as ``"1,0,1"``: an axis, projected
-        onto the surface. ``"around:z"``: around an axis. ``"curvature"``: the direction of greatest curvature, as
-        around a cable. ``"curvature:least"``: perpendicular to that. Anything else is a file of strokes (.json), or
-        the strokes themselves. Each stroke is a list of at least two points (x, y, z), in units of the mesh.
-        Directions between strokes are interpolated.
+        Directions on the surface that the texture follows. ``"x"``, ``"y"``, ``"z"`` or three numbers such as
+        ``"1,0,1"``: an axis, projected onto the surface. ``"around:z"``: around an axis. ``"curvature"``: the direction
+        of greatest curvature, as around a cable. ``"curvature:least"``: the direction of least curvature. Anything else
+        is a file of strokes (.json), or the strokes themselves. Each stroke is a list of at least two points (x, y, z),
+        in units of the mesh. Directions between strokes are interpolated.
     scale : float
         Number of voxels per unit of the mesh, as for `texture_mesh`.
     along : {"x", "y", "z"}

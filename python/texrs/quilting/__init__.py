@@ -17,8 +17,9 @@ Departures from the paper, with their reasons:
   fuses similar elements such as coins and olives.
 - If the texture has a lattice, all overlapping pixels that differ also add to the cost of a patch. A seam through
   plain background would not show that the patch does not match the lattice.
-- A patch has a cost for samples that other patches already use, and for continuing exactly where a neighbour ends. The
-  cost is added, because a factor on the match would be zero for an exact continuation, which would always win.
+- A patch costs more if it uses samples that other patches already use, or if it continues exactly where a neighbour
+  ends. This cost is added to that of the match. If it were a factor, the total of an exact continuation would be zero,
+  and the continuation would always win.
 - A texture with courses is only quilted along the courses. Its images are placed so that their joints coincide.
 - For large textures, several rows of patches are cut in parallel, each row two patches behind the row above. The cost
   for repetition then does not count patches that are cut at the same time.

@@ -114,7 +114,7 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
         )
     up = as_choice(green, "green", ("up", "down")) == "up"
     vectors, blank = given.astype(np.float64), (given == 0).all(axis=-1)
-    # Decode normal maps to -1 to 1. Unit vectors without negative components are not encoded.
+    # Decode normal maps to -1 to 1. Leave unit vectors unchanged, because they are decoded already.
     if given.dtype.kind in "ui":
         vectors = vectors * (2 / float(np.iinfo(given.dtype).max)) - 1
     elif np.nanmin(vectors, initial=1.0) >= 0 and not _are_unit(vectors):

@@ -24,7 +24,8 @@ def cubes(volume: ArrayLike, spacing: Sequence[float]) -> Array:
     volume : array_like
         Volume of shape (D, H, W) or (D, H, W, C).
     spacing : (plane, row, column) float
-        Voxel size along each axis, in any unit. The smallest size becomes the side of the cubes.
+        Voxel size along each axis, in any unit. Voxels become cubes with the smallest of these sizes as
+        their side.
 
     Returns
     -------

@@ -378,7 +378,7 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
     """Return the steps of image rows and columns in voxels, (2, 3), perpendicular to a normal or as given."""
     if (normal is None) == (axes is None):
-        raise InvalidInput("normal, axes: must not both be given or both be omitted; give one of them")
+        raise InvalidInput("normal, axes: exactly one of these must be given")
     if axes is not None:
         steps = try_array(axes, np.float64)
         if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:

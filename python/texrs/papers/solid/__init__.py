@@ -105,7 +105,7 @@ def solid(
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
         Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
-        ``axes=3`` states whether its values are labels, and along which axes it is periodic. For other types, both are
+        ``axes=3`` states whether its values are labels, and along which axes it is periodic; for other types, both are
         measured.
     size : int or (planes, rows, columns)
         Size of the result in voxels. One number gives a cube.
@@ -254,7 +254,7 @@ def synthesize(
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
-        whether its values are labels, and along which axes it is periodic. For other types, both are measured.
+        whether its values are labels, and along which axes it is periodic; for other types, both are measured.
     size : int or (int, int)
         Size of the result in pixels. One number gives a square.
     field : Field, str, array_like or path_like, optional

@@ -32,7 +32,7 @@ class PlaneTexture(Texture):
     ----------
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
         Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
-        whether its values are labels, and along which axes it is periodic. For other types, both are measured.
+        whether its values are labels, and along which axes it is periodic; for other types, both are measured.
     field : Field, str, array_like or path_like, optional
         Frame field with two axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or length
         that the text does not state has the default for an unbounded texture. None leaves the texture as it is.
@@ -87,7 +87,7 @@ class SolidTexture(Texture):
     ----------
     exemplar : (D, H, W) or (D, H, W, C) array, Exemplar or Material
         Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
-        ``axes=3`` states whether its values are labels, and along which axes it is periodic. For other types, both are
+        ``axes=3`` states whether its values are labels, and along which axes it is periodic; for other types, both are
         measured.
     field : Field, str, array_like or path_like, optional
         Frame field with three axes: rotation and scale of the texture at each point (`texrs.fields`). A centre or

@@ -57,8 +57,8 @@ Departures from the paper, with their reasons:
   with the surroundings that all elements share, such as a shadow. Colours are corrected along the cuts (`ground`).
 
 - If the light varies across an image of separate elements, it is removed before the elements move. Afterwards the
-  light of the new place is applied to each element (`shading`). Otherwise each element keeps the light of its old
-  place.
+  light of the new place is applied to each element (`shading`). Without this correction, each element would keep
+  the light of its old place.
 
 - Edits of separate elements put them into their new places on the texture's own background, which is completed at
   their old places (`rearrangement`). Pixels that do not move keep their values. If an element that the border cuts

@@ -73,7 +73,8 @@ def check_resized(entry: ElementAnalysis) -> ElementAnalysis:
     if len(entry.points) < FEWEST:
         size = entry.mask.shape
         raise InvalidInput(
-            f"size: must be large enough for the {FEWEST} elements that an edit requires, got {len(entry.points)} in {size}"
+            f"size: must be large enough for the {FEWEST} elements that an edit requires, got {size}, where the number of "
+            f"elements is {len(entry.points)}"
         )
     return entry
 

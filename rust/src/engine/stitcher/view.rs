@@ -1,10 +1,10 @@
-//! The content of a window of a canvas, and the choices of its points while patches are tried.
+//! The content of a window of a canvas, and which points may or must take the new patch while patches are tried.
 
 use super::canvas::{Canvas, FREE, HELD, Window};
 use super::source::{CHANNELS, Look, Source};
 use crate::foundation::fixed::Place;
 
-/// Choices of a point of a window.
+/// Sample that a point of a window shows after a patch is inserted: the old one, the new one, or either.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Tie {
@@ -29,7 +29,7 @@ pub(super) struct View<const D: usize> {
     pub points: Vec<f32>,
     /// Appearance of the points that are not empty.
     pub looks: Looks,
-    /// Choices of each point if a patch covers the mask.
+    /// Sample that each point shows if a patch covers the mask.
     pub ties: Vec<Tie>,
 }
 

@@ -115,7 +115,7 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
     // Check the memory for half of the rows, half of these and a transposed copy, or for the levels of the pyramid.
     memory::room("the solution", rows * columns, 12 * channels + 32)?;
     if !flow.is_empty() {
-        // A mask that is a rectangle is solved directly, other masks by multigrid.
+        // If the mask is a rectangle, solve directly. Otherwise use multigrid.
         match domain.mask {
             Some(mask) if !mask.iter().all(|&m| m) => {
                 match inner_rectangle(mask, [rows, columns]) {

@@ -169,8 +169,8 @@ impl Frame {
 /// half contains four times the pixel of the edge, plus the direction.
 type Edge = u64;
 
-/// Number of directions of edges from their pixel: along the row, along the column, and the falling
-/// diagonal. The fourth goes from the pixel's neighbour in the row to its neighbour in the column.
+/// Number of directions of edges. Three start at the edge's pixel: along the row, along the column, and along the
+/// falling diagonal. The fourth goes from the pixel's neighbour in the row to its neighbour in the column.
 const DIRECTIONS: usize = 4;
 
 fn pack(weight: f32, pixel: usize, direction: usize) -> Edge {

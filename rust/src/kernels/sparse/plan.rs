@@ -306,7 +306,7 @@ fn share_out(fronts: &[Front]) -> Vec<Job> {
 }
 
 impl Job {
-    /// Returns the work on a block and on all blocks below it.
+    /// Returns the job that processes a block and all blocks below it.
     fn of(last: usize, fronts: &[Front], work: &[u64], share: u64, level: usize) -> Self {
         let first = last - fronts[last].beneath;
         let mut children = Vec::new();

@@ -224,7 +224,8 @@ fn inner<const N: usize>(level: &Level, a: &[f32], others: [&[f32]; N]) -> [f64;
 }
 
 wide_fn! {
-    /// Adds the products of one row with others to the lanes.
+    /// Multiplies a row by each of the other rows, element by element, and adds the products to that row's eight
+    /// partial sums (`lanes`).
     fn multiply<const N: usize>(a: &[f32], others: [&[f32]; N], lanes: &mut [[f64; 8]; N]) {
         for (lanes, b) in lanes.iter_mut().zip(others) {
             let mut sums = *lanes;
