@@ -25,7 +25,7 @@ from texrs.elements import ElementAnalysis
 
 
 def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--seed 3 --wrap x --element-layers 2 --element-segmentation grid"
+    options = "--seed 3 --wrap x --element-layers 2 --element-segmentation none"
     options += " --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-allow-mirror"
     more = "--start 0.3 --growth-rate 1.9 --patch-size 12 --copies 2 --operations 1"
     more += " --stages stages --source-map source.npz -o out.png"
@@ -35,7 +35,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
         (40, 56),
         seed=3,
         wrap=(False, True),
-        elements=texrs.ElementOptions(layers=2, segmentation="grid"),
+        elements=texrs.ElementOptions(layers=2, segmentation="none"),
         deformation=texrs.DeformationOptions(
             operations=1, translate=0.1, rotate=20.0, scale=(0.9, 1.1), allow_mirror=False, start=0.3, growth_rate=1.9
         ),

@@ -170,7 +170,7 @@ def test_labels_keep_their_numbers(tmp_path: Path) -> None:
         Material({"labels": ids}).save(tmp_path, depth=depth)  # type: ignore[arg-type]
         suffix = ".exr" if depth == 32 else ".png"
         assert (io.read(tmp_path / f"labels{suffix}") == ids).all()
-    with pytest.raises(InvalidInput, match="labels from 0 to 255"):
+    with pytest.raises(InvalidInput, match="labels must be from 0 to 255"):
         Material({"labels": ids + np.uint16(200)}).save(tmp_path, depth=8)
 
 

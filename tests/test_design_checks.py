@@ -80,7 +80,7 @@ def measure(check, name, seed):
 
 
 CHECKS = ("d1", "d2", "d2b", "d3", "d3b", "d4", "d6", "d7", "d8", "d12", "d13")
-UNCOUNTED = ("grass", "coffee")
+UNCOUNTED = ("grass", "grit")
 """Textures without separate elements, or with fewer than a census needs."""
 
 

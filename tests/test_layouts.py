@@ -176,11 +176,12 @@ def test_known_elements_are_saved(tmp_path: Path) -> None:
         load(tmp_path / "bad.npz")
 
 
-def test_corrections_go_before_known_elements() -> None:
+def test_corrections_change_known_elements() -> None:
     entry = layouts.lattice(96, (0, 24), (24, 0))
     known = ElementAnalysis.of_labels(entry.image, entry.labels)
     fewer = correct(known, [{"op": "drop", "elements": [0]}])
-    assert fewer.known is None
+    assert fewer.known is not None
+    assert fewer.known.max() == len(known.points) - 1
     assert len(fewer.instances) == len(known.points) - 1
 
 

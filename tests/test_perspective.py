@@ -169,7 +169,7 @@ BAD = [
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: must be floats"),
     ({"target": np.ones((5, 5, 7), np.float32)}, "target: must have shape"),
-    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: cannot be combined with a given scale_map"),
+    ({"scale_measurement": {"min_feature_size": 3}}, "scale_measurement: cannot be combined with a scale map"),
     (
         {"scale_map": "auto", "scale_measurement": {"min_feature_size": 3}},
         "scale_measurement: must be a texrs.scale_maps.Measuring",

@@ -115,8 +115,8 @@ def view_elements(guide: Floats, given: Arguments, wrap: Wrap, seed: int, progre
     if len(confidence) < FEWEST:
         return None
     labels, confidence, count = _order(labels, confidence, wrap)
-    if count < FEWEST:
-        return None
+    # If the image shows few whole elements, remains count too.
+    count = max(count, FEWEST)
     inside = labels > 0
     if inside.all():
         inside = ~mark_outlines(labels)

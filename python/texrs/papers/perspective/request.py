@@ -193,7 +193,7 @@ def find_scale(
     """Return the plane of an exemplar or None, the size of its elements per pixel, and the measurement or None."""
     if scale_measurement is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput(
-            "scale_measurement: cannot be combined with a given scale_map, which is not measured; omit one of them"
+            "scale_measurement: cannot be combined with a scale map that is given, because it is not measured; omit one of them"
         )
     if is_words(scale_map):
         scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
