@@ -156,7 +156,7 @@ class Judge:
 
     def normalise(self, energies: Floats) -> Floats:
         """Return the energies of each cell as a column, in units of the exemplar's means."""
-        return np.sqrt(energies / self.scale[:, None, None]).reshape(len(energies), -1).astype(np.float32)
+        return np.asarray(np.sqrt(energies / self.scale[:, None, None]).reshape(len(energies), -1), np.float32)
 
 
 def split_colours(colours: Floats) -> Floats:
@@ -273,7 +273,7 @@ def measure_energies(planes: Floats) -> Floats:
             for energy in average(first[scale * ORIENTATIONS : (scale + 1) * ORIENTATIONS], 2):
                 found.append(average(filter_oriented(energy, scales), CELL // 2))
     rows, columns = (min(f.shape[axis] for f in found) for axis in (1, 2))
-    return np.maximum(np.concatenate([f[:, :rows, :columns] for f in found]), 0)
+    return np.asarray(np.maximum(np.concatenate([f[:, :rows, :columns] for f in found]), 0), np.float32)
 
 
 def find_distances(these: Floats, those: Floats, without: Bools | None = None) -> Floats:
