@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_choice, as_float, as_image
-from texrs._checks import check_memory
+from texrs._checks import check_memory, check_pixels
 from texrs._digits import write_number
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
@@ -95,6 +95,7 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
 
     """
     given = as_image(image)
+    check_pixels(given.shape[:2], "image")
     check_memory(8 * given.size, "image")
     if given.dtype not in (np.uint8, np.uint16):
         raise InvalidInput(
