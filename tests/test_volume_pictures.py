@@ -170,7 +170,10 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.slices(VOLUME, gap=-1), "gap"),
         (lambda p: volume.slices(np.full((3, 3, 3), np.nan)), "NaN"),
         (lambda p: volume.oblique_slice(VOLUME), "exactly one of these must be given"),
-        (lambda p: volume.oblique_slice(VOLUME, normal=(1, 0, 0), axes=np.eye(3)[:2]), "exactly one of these must be given"),
+        (
+            lambda p: volume.oblique_slice(VOLUME, normal=(1, 0, 0), axes=np.eye(3)[:2]),
+            "exactly one of these must be given",
+        ),
         (lambda p: volume.oblique_slice(VOLUME, normal=(0, 0, 0)), "normal: must be three finite numbers"),
         (lambda p: volume.oblique_slice(VOLUME, normal="up"), "normal"),
         (lambda p: volume.oblique_slice(VOLUME, (1, 2), (1, 0, 0)), "point"),

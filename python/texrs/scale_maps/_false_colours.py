@@ -94,8 +94,10 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     array([[0.5, 1. , 2. ]], dtype=float32)
 
     """
+    if isinstance(image, np.ndarray):
+        # Check before the array is copied, because a view of a few bytes can have billions of pixels.
+        check_pixels(image.shape[:2], "image")
     given = as_image(image)
-    check_pixels(given.shape[:2], "image")
     check_memory(8 * given.size, "image")
     if given.dtype not in (np.uint8, np.uint16):
         raise InvalidInput(
