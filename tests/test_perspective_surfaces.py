@@ -264,7 +264,7 @@ def test_a_column_that_repeats(weave):
         ({"target": "plane:slant=steep"}, "target: must be plane:slant=DEGREES"),
         ({"target": "plane:slant=99"}, "target: slant: must be a number between 0 and 88"),
         ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but with slant 80"),
-        ({"target": np.zeros((8, 8, 2, 2))}, "target: matrices must have scales of .* 64 of 64 do not"),
+        ({"target": np.zeros((8, 8, 2, 2))}, "target: must have scales of .* 64 of 64 do not"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
         ({"target": np.zeros((8, 8, 3))}, "target: normals: must contain a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* must be floats"),

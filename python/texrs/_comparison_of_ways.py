@@ -79,7 +79,7 @@ class Faults:
 
 
 def compare(faults: Mapping[str, Faults]) -> dict[str, float]:
-    """Return the score of each way of one exemplar. Lower is better; the scores of other exemplars are not comparable."""
+    """Return the score of each way of one exemplar. Lower is better. Scores of two exemplars cannot be compared."""
     table = {name: np.array([asdict(each)[key] for key in FLOORS]) for name, each in faults.items()}
     usual = np.mean(list(table.values()), axis=0) + np.array(list(FLOORS.values()))
     return {name: round(float(np.sqrt(row / usual).mean()), 4) for name, row in table.items()}
@@ -206,7 +206,7 @@ def pick(at: tuple[NDArray[np.intp], ...]) -> tuple[NDArray[np.intp], ...]:
 
 
 def measure_lines(colours: Floats, scale: float) -> tuple[Floats, float, float, float]:
-    """Return gradients, the least gradient of a line, and the shares of neighbours with a broken line and with a line."""
+    """Return gradients, the least gradient of a line, and the usual shares of broken lines and of lines."""
     from scipy.ndimage import gaussian_filter
 
     soft, shape = gaussian_filter(colours, (scale, scale, 0)), colours.shape[:2]

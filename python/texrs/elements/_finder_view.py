@@ -230,7 +230,7 @@ def _order(labels: Labels, confidence: NDArray[np.float64], wrap: Wrap) -> tuple
 
 
 def _choose_box(labels: Labels) -> Box:
-    """Return the box of the most typical element that no border cuts, or a box of the median size around the first one."""
+    """Return the box of the most typical whole element, or a box of median size if all elements are cut."""
     shape = (labels.shape[0], labels.shape[1])
     whole = rank_pieces(labels, LEAST**2)
     if whole:

@@ -52,9 +52,9 @@ class ElementOptions:
         Number of colour layers, 1 to 16, if whole layers move ("none"). If it is given, "auto" means "none". Fewer are
         used if the image has fewer colours. Default: 2.
     segmentation : {"auto", "components", "grid", "none"}
-        Elements that move. "components": elements that are found, as separate areas. "grid": jittered
-        cells of 1/6 of the side, for images without elements. "none": whole colour layers, as in the paper. "auto":
-        the elements, or the grid if there are none or if they are the meshes of a net.
+        Elements that move. "components": elements that are found, as separate areas. "grid": jittered cells of 1/6 of
+        the side, for images without elements. "none": whole colour layers, as in the paper. "auto": the elements, or
+        the grid if there are none or if they are the meshes of a net.
     labels : (H, W) array of int, or a list of one per exemplar, optional
         Elements marked by hand: one number per element, where 0 is the background. They replace the segmentation.
 
@@ -244,8 +244,7 @@ def segment(
         Options for finding the elements.
     progress : callable or True, optional
         Function that is called as ``progress("segment", share)`` with a rising share. An exception from it stops the
-        work. True shows a progress bar. The longest step between two calls splits touching elements. This step takes 1
-        s for 1024 x 1024 pixels, and its duration grows with the number of elements.
+        work. True shows a progress bar.
 
     Returns
     -------

@@ -5,9 +5,9 @@ coordinates of its source sample in the exemplar, in fixed point. The steps of e
 
 1. The **start** gives the first level its places: patch-based initialisation, patches stitched along minimum cuts, or
    a given draft (`texrs.growth.start`).
-2. Each finer level is **upsampled** from the previous level, with the Jacobians of the frames. 3. The **constraints**
-of the level are inserted (`texrs.growth.constraints`). 4. The **corrector** changes places until every window of the
-output resembles a window of the exemplar
+2. Each finer level is **upsampled** from the previous level, with the Jacobians of the frames.
+3. The **constraints** of the level are inserted (`texrs.growth.constraints`).
+4. The **corrector** changes places until every window of the output resembles a window of the exemplar
    (`texrs.growth.windows`, or a corrector of the caller).
 
 The caller passes the start, the constraints and the corrector as functions. Levels are numbered as in the exemplar's

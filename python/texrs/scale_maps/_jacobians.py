@@ -41,7 +41,7 @@ def as_jacobians(value: object, name: str = "jacobians") -> Jacobians:
     if flat.any():
         row, column = (int(i) for i in np.argwhere(flat)[0])
         raise InvalidInput(
-            f"{name}: matrices must have scales of {MIN_SCALE} to {MAX_SCALE:.0f} and a foreshortening of at most {WORST:g}; "
+            f"{name}: must have scales of {MIN_SCALE} to {MAX_SCALE:.0f} and a foreshortening of at most {WORST:g}; "
             f"{np.count_nonzero(flat)} of {flat.size} do not, the first at ({row}, {column})"
         )
     return np.asarray(given, np.float64)

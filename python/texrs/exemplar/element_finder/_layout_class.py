@@ -45,9 +45,9 @@ def read_layout(choice: Choice, contours: Contours) -> dict[Arrangement, float]:
 def measure_cues(choice: Choice, contours: Contours) -> dict[str, float]:
     """Return the cues of the layout.
 
-    - contact of the elements, width of the gaps, lightness in and around the gaps
-    - shape, contrast and number of the elements, strength of contours inside
-    - value of the choice, and whether dark lines are contours
+    - Contact of the elements, width of the gaps, and lightness in and around the gaps.
+    - Shape, contrast and number of the elements, and strength of contours inside.
+    - Value of the choice, and whether dark lines are contours.
     """
     labels, f, light = choice.labels, choice.chosen.features, contours.lab[..., 0]
     background, inner = labels == 0, labels > 0

@@ -155,8 +155,8 @@ def design(
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
         best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
-        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
-        courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
+        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such as
+        a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
@@ -205,9 +205,9 @@ def design(
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``motion``: For each example: "move", "keep" or "stitch".
         - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial. 0 is
-          best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and
-          coarse lines that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine
-          and coarse steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
+          best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and coarse lines
+          that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine and coarse
+          steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
           of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that the texture is built from, or None.
         - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
@@ -342,8 +342,8 @@ def design_variants(
         Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
         patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
         best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
-        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in
-        courses, such as a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
+        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such as
+        a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
