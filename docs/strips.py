@@ -32,7 +32,7 @@ def design() -> Iterator[Strip]:
 
     def rotate(angle: float) -> Picture:
         options = texrs.DeformationOptions(rotate=angle, allow_mirror=False)
-        return texrs.design(pebbles, 192, deformation=options, motion="move", seed=1).image
+        return texrs.design(pebbles, 192, deformation=options, way="move", seed=1).image
 
     def mix(share: float) -> Picture:
         return texrs.design([leaves, pebbles], 192, weights=[1 - share, share], seed=1).image
@@ -335,7 +335,7 @@ def batch() -> Iterator[Strip]:
 
     def make(seed: int, preset: str) -> Picture:
         return texrs.design(
-            pebbles, 160, deformation=texrs.DeformationOptions(**presets[preset]), motion="move", seed=seed
+            pebbles, 160, deformation=texrs.DeformationOptions(**presets[preset]), way="move", seed=seed
         ).image
 
     for preset, options in presets.items():

@@ -39,7 +39,7 @@ def draw_comparison() -> np.ndarray:
             source,
             quilt(source, LARGE, seed=1),
             lay_tiles(make_tiles(source), size),
-            texrs.design(source, size, seed=1, motion="keep", copies=1, deformation=still, screening=None).image,
+            texrs.design(source, size, seed=1, way="still", copies=1, deformation=still, screening=None).image,
             texrs.design(source, size, seed=1, method="paper").image,
             texrs.design(source, size, seed=1).image,
         ]
@@ -75,7 +75,7 @@ def draw_deformed() -> np.ndarray:
     for name in NAMES:
         source = example(name)
         for method in (None, "paper"):
-            variants = texrs.design_variants(source, 4, SMALL, seed=1, motion="move", copies=1, method=method)
+            variants = texrs.design_variants(source, 4, SMALL, seed=1, way="move", copies=1, method=method)
             rows.append(beside([source, *(made.image for made in variants)]))
     return below(rows)
 

@@ -42,7 +42,7 @@ def four() -> list[list[Panel]]:
 def design() -> list[list[Panel]]:
     """Show the stages of DESIGN."""
     flowers = samples.leaves_and_flowers((192, 192)).image
-    made = texrs.design(flowers, (384, 800), seed=3, motion="move")
+    made = texrs.design(flowers, (384, 800), seed=3, way="move")
     stages = {"deformed": "elements moved", "holes": "holes", "completed": "holes filled"}
     first: list[Panel] = [
         (flowers, "input", INPUT),

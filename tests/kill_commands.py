@@ -31,10 +31,10 @@ AGAIN = 10
 """Number of kills before a command is run to its end."""
 COMMANDS: dict[str, tuple[str, str]] = {
     "tile": ("tile in.png -o out.png --source-map map.npz --stages stages", "out.png map.npz"),
-    "design": ("design in.png -o out.png --size 96 --motion keep --source-map map.npz", "out.png map.npz"),
+    "design": ("design in.png -o out.png --size 96 --way still --source-map map.npz", "out.png map.npz"),
     "synthesize": ("synthesize in.png -o out.zarr --size 128 --chunks 64", ""),
     "synthesize, to a file": ("synthesize in.png -o out.tif --size 128 --chunks 64", "out.tif"),
-    "tiles": ("tiles in.png -o tiles --tile-size 32 --pictures 1 --motion keep", ""),
+    "tiles": ("tiles in.png -o tiles --tile-size 32 --pictures 1 --way still", ""),
     "database": ("database base add in.png --box 78,41,23,21 --layout disjoint", ""),
     "batch": ("batch recipe.toml", ""),
 }

@@ -66,8 +66,8 @@ def keep(array, how: str, folder: Path) -> Any:
 WAYS = ("str", "path", "pil", "xarray", "dlpack", "torch", "masked", "memoryview")
 VERBS = {
     "tile": (PEBBLES, lambda image: texrs.tile(image).image),
-    "design": (PEBBLES, lambda image: texrs.design(image, 96, motion="keep").image),
-    "design of several": (PEBBLES, lambda image: texrs.design([image, image], 64, motion="keep").image),
+    "design": (PEBBLES, lambda image: texrs.design(image, 96, way="still").image),
+    "design of several": (PEBBLES, lambda image: texrs.design([image, image], 64, way="still").image),
     "design_variants": (
         PEBBLES,
         lambda image: next(iter(texrs.design_variants(image, 1, 64))).image,
@@ -247,7 +247,7 @@ def test_channels_first_is_noticed_in_volumes_and_batches_but_not_guessed():
 
 def test_labels_of_64_bits_go_through_and_stay_exact():
     classes = (np.indices((48, 48)).sum(axis=0) // 6 % 3).astype(np.int64) * 2**61 - 7
-    for result in (texrs.tile(classes), texrs.synthesize(classes, 64), texrs.design(classes, 64, motion="keep")):
+    for result in (texrs.tile(classes), texrs.synthesize(classes, 64), texrs.design(classes, 64, way="still")):
         assert result.image.dtype == np.int64
         assert set(np.unique(result.image)) <= set(np.unique(classes))
     hole = np.zeros((48, 48), bool)

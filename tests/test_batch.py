@@ -27,7 +27,7 @@ options = { size = 48, copies = 1, source_map = "maps/{name}-{preset}-{seed}.npz
 sheet = "made/sheet.png"
 
 [presets.still]
-motion = "keep"
+way = "still"
 [presets.turned]
 rotate = 180.0
 allow_mirror = false

@@ -163,7 +163,7 @@ def test_seams_of_a_design_are_as_sharp_as_the_example():
     from scipy.ndimage import distance_transform_edt
 
     image = samples.pebbles((128, 128)).image
-    result = texrs.design(image, 160, seed=1, copies=2, motion="keep")
+    result = texrs.design(image, 160, seed=1, copies=2, way="still")
     parted = np.zeros((160, 160), bool)
     for axis in range(2):
         crosses = ~result.source_map.is_coherent(axis, wrap=True)

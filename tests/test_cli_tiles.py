@@ -10,7 +10,7 @@ from texrs import io, samples
 from texrs.cli import main
 
 DOTS = samples.dots((64, 64)).image
-OPTIONS = ["--tile-size", "48", "--pictures", "1", "--motion", "keep", "-q"]
+OPTIONS = ["--tile-size", "48", "--pictures", "1", "--way", "still", "-q"]
 FAR = 10**12
 
 
@@ -23,7 +23,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="module")
 def tiles() -> texrs.CornerTiles:
-    return texrs.CornerTiles(DOTS, 48, variants=1, motion="keep")
+    return texrs.CornerTiles(DOTS, 48, variants=1, way="still")
 
 
 def test_the_set_is_what_engines_read(here: Path, tiles: texrs.CornerTiles, capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,7 +45,7 @@ def test_windows_of_pictures_and_of_materials(here: Path, tiles: texrs.CornerTil
     assert np.array_equal(io.read("w.png"), tiles[-7:33, FAR : FAR + 50])
     texrs.Material({"albedo": DOTS, "height": DOTS[..., 0]}).save("stones")
     assert main(["tiles", "stones", "-o", "out", "--size", "50x40", *OPTIONS]) == 0
-    made = texrs.CornerTiles(texrs.Material.read("stones"), 48, variants=1, motion="keep").window(0, (40, 50))
+    made = texrs.CornerTiles(texrs.Material.read("stones"), 48, variants=1, way="still").window(0, (40, 50))
     assert made.material is not None
     for name in ("albedo", "height"):
         assert np.array_equal(io.read(f"out/{name}.png"), made.material[name].pixels)

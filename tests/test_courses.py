@@ -156,7 +156,7 @@ def test_sheets_of_a_texture_differ() -> None:
 
 
 def test_elements_of_a_wall_move_when_that_is_asked() -> None:
-    moved = texrs.design(lay_wall(seed=9), 224, motion="move")
+    moved = texrs.design(lay_wall(seed=9), 224, way="move")
     assert moved.report["courses"] == [None]
 
 

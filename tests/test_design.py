@@ -51,7 +51,7 @@ def test_stages_are_pictures_in_order(result):
     assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "before_blending"]
     assert result.stages["holes"].dtype == bool
     # A separate element leaves a hole where it was.
-    apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1, motion="move").stages
+    apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1, way="move").stages
     assert (apart["completed"][apart["holes"]] != apart["deformed"][apart["holes"]]).any()
 
 
@@ -97,11 +97,11 @@ def test_without_wrap_opposite_edges_are_free(pebbles):
 
 
 def test_elements_really_move(pebbles):
-    result = texrs.design(pebbles, (160, 224), seed=5, motion="move")
+    result = texrs.design(pebbles, (160, 224), seed=5, way="move")
     moved = [entry for entry in result.report["operations"][0][1:] if entry["operations"]]
     # In a heap most stones stay, because others need them as background.
     assert len(moved) >= 0.25 * result.report["elements"]
-    other = texrs.design(pebbles, (160, 224), seed=6, motion="move")
+    other = texrs.design(pebbles, (160, 224), seed=6, way="move")
     assert (other.image != result.image).mean() > 0.5
 
 

@@ -110,7 +110,7 @@ def test_elements_of_one_pixel_and_of_all_pixels_are_measured():
 
 def test_heaps_move_without_holes_to_speak_of():
     beans = samples.beans((128, 128)).image
-    made = texrs.design(beans, 96, copies=2, seed=1, motion="move")
+    made = texrs.design(beans, 96, copies=2, seed=1, way="move")
     moved = [e for e in made.report["operations"][0][1:] if "place" in e]
     assert len(moved) >= 0.15 * made.report["elements"]
     assert max(made.report["holes"]) < 0.1
@@ -119,7 +119,7 @@ def test_heaps_move_without_holes_to_speak_of():
 def test_operations_are_obeyed_in_heaps():
     beans = samples.beans((128, 128)).image
     made = {
-        n: texrs.design(beans, 96, copies=1, seed=1, motion="move", deformation=DeformationOptions(operations=n))
+        n: texrs.design(beans, 96, copies=1, seed=1, way="move", deformation=DeformationOptions(operations=n))
         for n in (None, 0, 1, 2, 6)
     }
     assert made[None].report["arrangement"] == ["heap"]
@@ -150,7 +150,7 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
     wall = samples.load(name, size=(160, 160)).image
     lattice = texrs.exemplar.segment(wall).lattice
     assert lattice is not None
-    made = texrs.design(wall, (200, 232), seed=1, copies=2, motion="keep")
+    made = texrs.design(wall, (200, 232), seed=1, copies=2, way="still")
     [closing] = made.report["lattice_stretch"]
     size = np.diag([200.0, 232.0])
     times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
@@ -169,7 +169,7 @@ def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
 
 def test_a_lattice_is_not_stretched_where_nothing_goes_around():
     wall = samples.bricks((160, 160)).image
-    made = texrs.design(wall, (200, 232), seed=1, copies=2, motion="keep", wrap=False)
+    made = texrs.design(wall, (200, 232), seed=1, copies=2, way="still", wrap=False)
     assert made.report["lattice_stretch"] == [None]
     assert (np.abs(made.source_map.jacobians()) == np.eye(2)).all()
 
@@ -178,7 +178,7 @@ def test_on_a_lattice_elements_move_by_its_shifts_alone():
     weave = samples.weave((160, 160)).image
     found = texrs.exemplar.segment(weave)
     assert found.lattice is not None
-    made = texrs.design(weave, 96, copies=2, seed=2, motion="move")
+    made = texrs.design(weave, 96, copies=2, seed=2, way="move")
     assert "lattice" in made.report["reason"]
     assert (made.report["rotate"], made.report["holes"]) == (0, [0, 0])
     lattice = np.array([found.lattice.a, found.lattice.b], float).T

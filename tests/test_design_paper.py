@@ -152,7 +152,7 @@ def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
     assert nearest(literal.stages["completed"], unit) < 0.01
     for start in (None, WEAK, 0.3, -0.61):
         options = DeformationOptions(start=start)
-        default = texrs.design(pebbles, 128, seed=1, copies=1, deformation=options, motion="move")
+        default = texrs.design(pebbles, 128, seed=1, copies=1, deformation=options, way="move")
         # In a heap few stones move, so a single variant keeps much of its input, but the texture does not.
         assert nearest(default.stages["completed"], unit) > 0.05
         assert nearest(default.image, pebbles) >= 0.4

@@ -17,28 +17,28 @@ def gravel():
 
 @pytest.fixture(scope="module")
 def chosen(gravel):
-    return {plan: texrs.design(gravel, 160, seed=5, motion=plan) for plan in ("auto", "move", "keep", "stitch")}
+    return {plan: texrs.design(gravel, 160, seed=5, way=plan) for plan in ("auto", "move", "still", "stitch")}
 
 
 def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     [tried] = chosen["auto"].report["candidates"]
     # Moved cells of a grid are not tried.
-    ways = {"keep", "stitch"} if chosen["auto"].report["segmentation"] == "grid" else {"move", "keep", "stitch"}
-    assert set(tried) == ways
-    [best] = chosen["auto"].report["motion"]
+    ways = {"still", "stitch"} if chosen["auto"].report["segmentation"] == "grid" else {"move", "still", "stitch"}
+    assert ways <= set(tried) <= ways | {"cells"}
+    [best] = chosen["auto"].report["way"]
     assert tried[best]["score"] <= min(each["score"] for each in tried.values()) + EQUAL
-    for plan in ("move", "keep", "stitch"):
-        assert chosen[plan].report["motion"] == [plan]
+    for plan in ("move", "still", "stitch"):
+        assert chosen[plan].report["way"] == [plan]
         assert chosen[plan].report["candidates"] == [None]
     np.testing.assert_array_equal(chosen["auto"].image, chosen[best].image)
-    assert (chosen["move"].image != chosen["keep"].image).any()
-    assert (chosen["stitch"].image != chosen["keep"].image).any()
+    assert (chosen["move"].image != chosen["still"].image).any()
+    assert (chosen["stitch"].image != chosen["still"].image).any()
 
 
 def test_stitched_patches_are_copies_that_wrap(gravel, chosen):
     made = chosen["stitch"]
     np.testing.assert_array_equal(made.source_map.jacobians(), np.broadcast_to(np.eye(2), (160, 160, 2, 2)))
-    unblended = texrs.design(gravel, 160, seed=5, motion="stitch", screening=None)
+    unblended = texrs.design(gravel, 160, seed=5, way="stitch", screening=None)
     np.testing.assert_array_equal(unblended.image, unblended.source_map.render(gravel))
     assert made.report["tiling"]
 
@@ -46,12 +46,12 @@ def test_stitched_patches_are_copies_that_wrap(gravel, chosen):
 def test_moved_elements_are_not_taken_where_they_are_torn():
     """Blades of grass are not elements that can be cut out."""
     grass = np.ascontiguousarray(samples.photograph("grass").image[:160, :160])
-    assert texrs.design(grass, 192).report["motion"] != ["move"]
+    assert texrs.design(grass, 192).report["way"] != ["move"]
 
 
 def test_elements_move_where_it_does_no_harm():
     """Buttons on plain cloth are found reliably, so moved ones look as good."""
-    assert texrs.design(samples.dots((96, 96)).image, 64).report["motion"] == ["move"]
+    assert texrs.design(samples.dots((96, 96)).image, 64).report["way"] == ["move"]
 
 
 def scramble(shape, side, seed):
@@ -79,7 +79,7 @@ def test_faults_of_scrambled_images_are_seen(name):
 
 
 def test_still_elements_are_copied_as_they_are(chosen):
-    still = chosen["keep"]
+    still = chosen["still"]
     assert still.report["holes"] == [0.0] * len(still.report["holes"])
     assert all(not entry.get("operations") for log in still.report["operations"] for entry in log)
     frames = np.abs(still.source_map.jacobians())
@@ -92,9 +92,9 @@ def test_still_elements_are_copied_as_they_are(chosen):
 def test_who_says_how_to_deform_is_obeyed(gravel):
     asked = texrs.DeformationOptions(translate=0.1)
     found = texrs.design(gravel, 64, deformation=asked, copies=1)
-    assert (found.report["motion"], found.report["candidates"]) == (["move"], [None])
-    paper = texrs.design(gravel, 64, method="paper", motion="keep", copies=1)
-    assert (paper.report["motion"], paper.report["candidates"]) == (["move"], [None])
+    assert (found.report["way"], found.report["candidates"]) == (["move"], [None])
+    paper = texrs.design(gravel, 64, method="paper", way="still", copies=1)
+    assert (paper.report["way"], paper.report["candidates"]) == (["move"], [None])
 
 
 def test_plans_are_tried_once_an_exemplar():
@@ -106,7 +106,7 @@ def test_plans_are_tried_once_an_exemplar():
     ]
     tried = [share for seed, stage, share in steps if stage == "try" and seed == 0]
     assert tried == sorted(tried)
-    assert len(set(tried)) == 3
+    assert len(set(tried)) >= 3
     assert not any(stage == "try" for seed, stage, _ in steps if seed == 1)
     assert made[0].report["candidates"] == made[1].report["candidates"]
 
@@ -115,10 +115,10 @@ def test_each_exemplar_of_several_has_a_plan(gravel):
     dots = samples.dots((128, 128)).image
     grey = np.repeat(gravel[..., np.newaxis], 3, axis=-1) if gravel.ndim == 2 else gravel
     found = texrs.design([dots, grey], 128, seed=1)
-    assert len(found.report["motion"]) == len(found.report["candidates"]) == 2
-    assert found.report["motion"][0] == texrs.design(dots, 128).report["motion"][0]
+    assert len(found.report["way"]) == len(found.report["candidates"]) == 2
+    assert found.report["way"][0] == texrs.design(dots, 128).report["way"][0]
 
 
 def test_plans_are_checked(gravel):
-    with pytest.raises(InvalidInput, match="^motion"):
-        texrs.design(gravel, 64, motion="fly")
+    with pytest.raises(InvalidInput, match="^way"):
+        texrs.design(gravel, 64, way="fly")

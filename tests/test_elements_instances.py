@@ -178,7 +178,7 @@ def test_what_is_said_of_elements_stands_above_the_entry() -> None:
 def test_entries_and_pictures_are_mixed() -> None:
     plain = 255 - ENTRY.image
     labels = [ENTRY.labels, np.zeros_like(ENTRY.labels)]
-    options = {"copies": 1, "motion": "keep"}
+    options = {"copies": 1, "way": "still"}
     made = texrs.design([ENTRY, replace(ENTRY, image=plain, mask=np.zeros_like(MASK))], 64, **options)
     marked = texrs.design([ENTRY.image, plain], 64, elements=ElementOptions(labels=labels), **options)
     np.testing.assert_array_equal(made.image, marked.image)
@@ -188,7 +188,7 @@ def test_entries_and_pictures_are_mixed() -> None:
 def test_design_parts_what_lies_across_a_border() -> None:
     centres = np.array([[2.0, 40], [50, 1], [50, 50]])
     entry = make_entry(centres, draw_discs(centres, np.array([RADIUS] * 3), wrap=True), wrap=(True, True))
-    assert texrs.design(entry, 64, copies=1, motion="move").report["elements"] == 5
+    assert texrs.design(entry, 64, copies=1, way="move").report["elements"] == 5
 
 
 @pytest.mark.parametrize("exemplar", [ENTRY.image[:64], [ENTRY.image, ENTRY.image]], ids=["shape", "several"])

@@ -19,8 +19,8 @@ from texrs.cli import main
 from texrs.elements import ElementAnalysis, Layout, correct, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.exemplar.shapes import mark_outlines
-from texrs.papers.splice.placement import continue_points
 from texrs.point_sets import PointLayout
+from texrs.sowing import continue_points
 
 DOTS = ElementAnalysis.of_sample(samples.dots((128, 128)))
 WALL = ElementAnalysis.of_sample(samples.bricks((160, 160)))

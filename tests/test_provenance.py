@@ -70,7 +70,7 @@ WRITERS = {
     "splice": "splice in.png in.png -o {}.png",
     "synthesize": "synthesize in.png --size 48 -o {}.png",
     "tile": "tile in.png -o {}.png",
-    "tiles": "tiles in.png --tile-size 48 --pictures 1 --motion keep --size 40 -o {}.png",
+    "tiles": "tiles in.png --tile-size 48 --pictures 1 --way still --size 40 -o {}.png",
 }
 """A command of each kind that writes one file."""
 

@@ -19,9 +19,9 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import find_cells
 from texrs.exemplar.contours import resample
 from texrs.exemplar.shapes import mark_outlines
+from texrs.mosaic.outlines import interpolate, match_outlines, rematch_outlines
+from texrs.mosaic.tessellation import take_cells
 from texrs.papers.splice.cells import find_entry_cells
-from texrs.papers.splice.cells.outlines import interpolate, match_outlines, rematch_outlines
-from texrs.papers.splice.cells.tessellation import take_cells
 
 SIZE = (160, 160)
 

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import texrs
 
 pebbles = texrs.samples.pebbles((160, 160)).image
-result = texrs.design(pebbles, 224, seed=3, motion="move")
+result = texrs.design(pebbles, 224, seed=3, way="move")
 stages = result.stages
 
 figure, row = plt.subplots(1, 5, width_ratios=[160, 160, 160, 160, 224], figsize=(11, 2.6), layout="constrained")

@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,10 @@ FLOORS = {
 """Values of the figures below which a fault is hardly visible. Chosen by eye on half of 51 pictures."""
 
 
+Name = TypeVar("Name", bound=str)
+"""Name of a way."""
+
+
 @dataclass(frozen=True, slots=True)
 class Faults:
     """Faults of a texture (see the module). 0 is the best value of each."""
@@ -78,7 +83,7 @@ class Faults:
         return {name: round(value, 4) for name, value in asdict(self).items()}
 
 
-def compare(faults: Mapping[str, Faults]) -> dict[str, float]:
+def compare(faults: Mapping[Name, Faults]) -> dict[Name, float]:
     """Return the score of each way of one exemplar. Lower is better. Scores of two exemplars cannot be compared."""
     table = {name: np.array([asdict(each)[key] for key in FLOORS]) for name, each in faults.items()}
     usual = np.mean(list(table.values()), axis=0) + np.array(list(FLOORS.values()))

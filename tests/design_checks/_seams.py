@@ -48,7 +48,7 @@ def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
         bool(np.isfinite(image).all()) if floats else True,
         inside,
         tuple(float(h) for h in result.report.get("holes", ())),
-        result.report.get("motion") in (["keep"], ["stitch"])
+        result.report.get("way", ["move"]) != ["move"]
         or any("place" in entry for log in result.report.get("operations", ()) for entry in log),
     )
 

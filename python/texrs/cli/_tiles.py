@@ -31,7 +31,7 @@ CELLS = 256
 TILED = Options(CornerTiles, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
 DESIGNED = Options(
     design_variants,
-    only=("elements", "deformation", "motion", "copies", "patch_size", "screening"),
+    only=("elements", "deformation", "way", "copies", "patch_size", "screening"),
     names={"elements": "element"},
 )
 PANEL = "Larger than memory"

@@ -79,7 +79,7 @@ class CornerTiles(InParts):
     progress : callable or True, optional
         Function called as ``progress(stage, share)``. If it raises an exception, the work stops. True shows a bar.
     **options
-        Options of `texrs.design_variants`, such as ``motion`` or ``deformation``.
+        Options of `texrs.design_variants`, such as ``way`` or ``deformation``.
 
     Raises
     ------

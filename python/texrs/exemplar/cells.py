@@ -267,6 +267,8 @@ def fill_gaps(labels: Labels) -> Labels:
     # Leave joints of the usual width. The mean depth of a joint is about a quarter of its width, plus a half.
     narrow = depth[(labels == 0) & ~large[gaps]]
     gaps[depth <= (min(4 * float(narrow.mean()) - 2, 2 * reach) if len(narrow) else 0)] = 0
+    # A gap that is not wider than a joint is not a cell.
+    large &= np.bincount(gaps.ravel(), minlength=len(large)) > 0
     number = np.where(large, count + np.cumsum(large), 0)
     return np.asarray(np.where(labels > 0, labels, number[gaps]), np.int32)
 

@@ -67,7 +67,7 @@ class TextureAugment:
 
     Use it for images of textures, such as surfaces, materials, tissue, fields, and defects on them. Distant parts of
     an image become neighbours. Seams avoid places where they would be visible, and elements stay whole if possible
-    (`texrs.design` with ``motion="keep"``). Every pixel is a copy of a pixel of the image, without interpolation.
+    (`texrs.design` with ``way="still"``). Every pixel is a copy of a pixel of the image, without interpolation.
 
     Each call without a seed gives another sample. The operating system draws its seed, so forked workers also differ.
     The same image and seed give the same result in any process and with any number of threads. The kernels release the
@@ -148,7 +148,7 @@ class TextureAugment:
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: must have the size of the image, {known.shape}, got {labels.shape[:2]}")
-        source = design(known, known.shape, seed=number, wrap=False, motion="keep").source_map
+        source = design(known, known.shape, seed=number, wrap=False, way="still").source_map
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.min_visible)

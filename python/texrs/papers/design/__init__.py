@@ -44,9 +44,9 @@ Departures from the paper, with their reasons:
 - The child layers are the elements that `texrs.exemplar.element_finder` finds, instead of segments of colour layers. If
   an example has no elements, or if they are the meshes of a net, a jittered grid of cells takes their place.
 
-- Three ways are tried at a small size. Elements move, or they stay in place and large patches give variety, or smaller
-  patches are placed where they fit best. The way with the fewest faults is used. The faults are measured without a
-  segmentation: lost regularity, lines that break off, foreign content, and steps of tone.
+- Several ways are tried at a small size (`texrs.papers.design.ways`), and the one with the fewest faults is used. The
+  faults are measured without a segmentation: lost regularity, lines that break off, foreign content, and steps of
+  tone. The paper always moves elements, which tears those that are close together.
 
 - Images are not mirrored along an axis if the mirror image looks different from the example. Light from one side and
   hanging leaves cause such a difference. ``rotate=0`` means that the example has an upper side, and disables
@@ -90,13 +90,14 @@ from texrs._typing import Progress
 from texrs._verbs import takes_materials
 from texrs.blending import SCREENING
 from texrs.elements import ElementAnalysis
+from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions
 from texrs.papers.design.arguments import Arguments, Choice, Density, Exemplars, Method, Size, Weights, check_arguments
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
 from texrs.papers.design.texture import correct_colours, look_up
-from texrs.papers.design.trials import choose_plan, make_composite
+from texrs.papers.design.trials import choose_other, choose_plan, make_composite
 from texrs.synthesis import Synthesis
 from texrs.tiling._check import check_result, report_tiling
 
@@ -114,7 +115,7 @@ def design(
     density: Density = None,
     elements: ElementOptions | ElementAnalysis = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
-    motion: Choice = "auto",
+    way: Choice = "auto",
     copies: int = 4,
     patch_size: int | None = None,
     screening: float | None = SCREENING,
@@ -151,12 +152,14 @@ def design(
         used. Default: the default options.
     deformation : DeformationOptions
         Options that control how elements are deformed. Default: the default options.
-    motion : {"auto", "move", "keep", "stitch"}
-        Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
-        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such as
-        a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
+    way : {"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}
+        Way to lay the texture. "move" deforms elements, as in the paper. "still" leaves elements in place, and joins
+        patches of the exemplar and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes
+        "lattice" or "courses". Patches are then in step with the lattice, or the texture is built course by course.
+        "stitch" joins smaller patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a
+        new arrangement. "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways
+        that the exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it
+        is "move". Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
@@ -203,8 +206,8 @@ def design(
         - ``reason``: Reason for this kind, as one sentence.
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
-        - ``motion``: For each example: "move", "keep" or "stitch".
-        - ``candidates``: For each example, the figures of each motion that was tried, or None without a trial. 0 is
+        - ``way``: Way that each example was laid in.
+        - ``candidates``: For each example, the figures of each way that was tried, or None without a trial. 0 is
           best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and coarse lines
           that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine and coarse
           steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
@@ -259,7 +262,7 @@ def design(
     >>> result.source_map.render(heights).shape
     (128, 160)
     >>> stones = texrs.elements.ElementAnalysis.of_sample(texrs.samples.pebbles((96, 96)))
-    >>> texrs.design(stones, 96, copies=1, motion="move").report["segmentation"]
+    >>> texrs.design(stones, 96, copies=1, way="move").report["segmentation"]
     'labels'
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, allow_mirror=False))
 
@@ -275,7 +278,7 @@ def design(
         density=density,
         elements=elements,
         deformation=deformation,
-        motion=motion,
+        way=way,
         copies=copies,
         patch_size=patch_size,
         screening=screening,
@@ -297,7 +300,7 @@ def design_variants(
     density: Density = None,
     elements: ElementOptions | ElementAnalysis = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
-    motion: Choice = "auto",
+    way: Choice = "auto",
     copies: int = 4,
     patch_size: int | None = None,
     screening: float | None = SCREENING,
@@ -338,12 +341,14 @@ def design_variants(
         used. Default: the default options.
     deformation : DeformationOptions
         Options that control how elements are deformed. Default: the default options.
-    motion : {"auto", "move", "keep", "stitch"}
-        Treatment of the elements. "move" deforms elements, as in the paper. "keep" leaves elements in place, and joins
-        patches of the exemplar and its mirror images on a grid. "stitch" joins smaller patches, each where it fits
-        best. "auto" tries these at a small size and uses the best one. It never moves cells of a grid or stitches a
-        lattice. With "auto", elements move if ``deformation`` or ``method`` is given. An exemplar in courses, such as
-        a stone wall, is built course by course unless "move" or "stitch" is given. Default: "auto".
+    way : {"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}
+        Way to lay the texture. "move" deforms elements, as in the paper. "still" leaves elements in place, and joins
+        patches of the exemplar and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes
+        "lattice" or "courses". Patches are then in step with the lattice, or the texture is built course by course.
+        "stitch" joins smaller patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a
+        new arrangement. "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways
+        that the exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it
+        is "move". Default: "auto".
     copies : int
         Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
     patch_size : int, optional
@@ -396,7 +401,7 @@ def design_variants(
         density=density,
         elements=elements,
         deformation=deformation,
-        motion=motion,
+        way=way,
         copies=copies,
         patch_size=patch_size,
         screening=screening,
@@ -435,7 +440,14 @@ def segment(arguments: Arguments) -> list[Plan]:
 
 def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synthesis:
     """Synthesise one texture from analysed exemplars (steps 2 to 6)."""
-    tiles, composite = make_composite(plans, arguments, seed)
+    try:
+        tiles, composite = make_composite(plans, arguments, seed)
+    except InvalidInput:
+        # A new arrangement can be too large for the size of the texture. Then the next best way is used.
+        others = [choose_other(plan) for plan in plans]
+        if others == list(plans):
+            raise
+        return make_texture(others, arguments, seed)
     picture = look_up(composite, arguments)
     image, seams = correct_colours(composite, picture, arguments)
     report = describe(plans, tiles, composite, seams, arguments, seed)

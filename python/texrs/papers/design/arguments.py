@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.papers.design.options import DeformationOptions
+from texrs.papers.design.plan import Way
 
 __all__ = ["Arguments", "Choice", "Density", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
@@ -38,7 +39,7 @@ Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Density: TypeAlias = float | Sequence[float] | Array | None
 Method: TypeAlias = Literal["paper"] | None
-Choice: TypeAlias = Literal["auto", "move", "keep"]
+Choice: TypeAlias = Literal["auto"] | Way
 
 MINIMUM_SIDE = 16
 """Minimum side of an exemplar, in pixels. A smaller image is too small for a texture."""
@@ -62,7 +63,7 @@ class Arguments:
     """Share of the area that elements of each exemplar after the first cover: (n - 1,), or (rows, columns, n - 1)."""
     elements: ElementOptions
     deformation: DeformationOptions
-    motion: Choice
+    way: Choice
     copies: int
     side: int | None
     """Side of the patches that fill holes, in pixels, or None for the default."""
@@ -93,7 +94,7 @@ def check_arguments(
     density: Density,
     elements: ElementOptions | ElementAnalysis,
     deformation: DeformationOptions,
-    motion: Choice,
+    way: Choice,
     copies: int,
     patch_size: int | None,
     screening: float | None,
@@ -119,7 +120,7 @@ def check_arguments(
         raise InvalidInput(
             f"density: cannot be combined with {other}, because density scatters elements over the first exemplar"
         )
-    as_choice(motion, "motion", ("auto", "move", "keep", "stitch"))
+    as_choice(way, "way", ("auto", *get_args(Way)))
     arguments = Arguments(
         exemplars,
         scale_together(exemplars),
@@ -130,7 +131,7 @@ def check_arguments(
         None if density is None else as_density(density, len(exemplars), (rows, columns)),
         chosen,
         deformation,
-        motion,
+        way,
         as_int(copies, "copies", 1, 64),
         None if patch_size is None else as_int(patch_size, "patch_size", 4, min(min(e.shape) for e in exemplars)),
         as_float(0.0 if screening is None else screening, "screening", 0, 1e6),

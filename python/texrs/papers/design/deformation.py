@@ -16,7 +16,7 @@ import numpy as np
 from texrs._engine.noise import uniform
 from texrs.exemplar.segmentation import Segmentation
 from texrs.exemplar.shapes import measure_solidity
-from texrs.exemplar.symmetry import flip
+from texrs.exemplar.symmetry import NONE, flip
 from texrs.papers.design.canvas import Canvas, Draft
 from texrs.papers.design.elements import Element, Placement, fit, measure_elements
 from texrs.papers.design.heaps import Heap
@@ -72,7 +72,9 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         The tile, with holes where neither an element nor background is.
 
     """
-    if plan.still:
+    if plan.way == "sow":
+        return clear(plan)
+    if plan.way != "move":
         return rest(plan, tile)
     parts = plan.parts
     # Choose a mirror image of the exemplar. Both the background and the elements are copied from it.
@@ -116,6 +118,11 @@ def rest(plan: Plan, tile: int) -> Draft:
     """Return a tile with the unchanged exemplar. Successive tiles use its permitted mirror images in turn."""
     mirror = plan.mirrors[tile % len(plan.mirrors)]
     return Canvas.start_on_picture(flip(plan.guide, mirror), mirror)
+
+
+def clear(plan: Plan) -> Draft:
+    """Return a tile with the background of the exemplar, without its elements."""
+    return Canvas.start_on_background(plan.guide, NONE, plan.parts.elements, frozenset(), True)
 
 
 def describe(element: Element, operations: Sequence[Operation], *, full: bool) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -17,7 +18,10 @@ from texrs.papers.design.canvas import Tile
 from texrs.papers.design.operations import Moves
 from texrs.papers.design.options import DeformationOptions
 
-__all__ = ["Plan", "make_plan"]
+__all__ = ["Plan", "Way", "make_plan"]
+
+Way: TypeAlias = Literal["move", "still", "lattice", "courses", "stitch", "cells", "sow"]
+"""Ways to lay a texture (`texrs.papers.design.ways`)."""
 
 ROTATE, DIRECTED = 60.0, 0.25
 """Largest rotation by default, in degrees, and anisotropy above which elements are not turned."""
@@ -42,12 +46,10 @@ class Plan:
     """If True, the paper is followed as printed."""
     pure: bool
     """If True, holes are filled with background only."""
-    still: bool = False
-    """If True, elements stay in place, so that only patches give variety."""
-    stitched: bool = False
-    """If True, the stitcher of `texrs.growth` places the patches, each where it fits best. Elements stay in place."""
-    tried: Mapping[str, Mapping[str, float]] | None = None
-    """Scores of each way that was tried, or None."""
+    way: Way = "move"
+    """Way to lay the texture (`texrs.papers.design.ways`)."""
+    tried: Mapping[Way, Mapping[str, float]] | None = None
+    """Score and faults of each way that was tried, or None."""
     tiles: Sequence[Tile] = ()
     """Tiles that the trial has just computed. A texture with the trial's seed uses them again."""
 

@@ -59,10 +59,8 @@ def describe(
         "elements": sum(p.parts.count for p in plans),
         "segmentation": first.parts.kind,
         "reason": first.parts.reason,
-        "arrangement": [
-            "courses" if p.still and not p.stitched and p.parts.courses else classify(p.parts) for p in plans
-        ],
-        "motion": ["stitch" if p.stitched else "keep" if p.still else "move" for p in plans],
+        "arrangement": ["courses" if p.way == "courses" else classify(p.parts) for p in plans],
+        "way": [p.way for p in plans],
         "candidates": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
         "lattice_stretch": [describe_closing(p, arguments) for p in plans],
@@ -86,7 +84,7 @@ def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | No
 
 def describe_courses(plan: Plan) -> dict[str, Any] | None:
     """Return the courses of an exemplar as JSON types, or None if the texture is not built from courses."""
-    courses = plan.parts.courses if plan.still and not plan.stitched else None
+    courses = plan.parts.courses if plan.way == "courses" else None
     return None if courses is None else asdict(courses)
 
 

@@ -1,8 +1,7 @@
-"""Choose how an exemplar is rearranged, by trials at a small size.
+"""Choose the way to lay a texture, by trials at a small size.
 
 This is a departure from the paper, which always moves elements. Elements that are close together, or were not
-segmented correctly, are torn if they move. Patches of the unchanged exemplar then give a better texture, because their
-seams run between elements. They are placed on a grid ("keep"), or each where it fits best ("stitch").
+segmented correctly, are torn if they move. Other ways (`texrs.papers.design.ways`) then give a better texture.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from texrs._comparison_of_ways import Judge, compare
+from texrs._comparison_of_ways import Faults, Judge, compare
 from texrs._typing import Array
+from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.metrics import measure_salience, measure_use
 from texrs.papers.design.arguments import Arguments
@@ -21,12 +21,13 @@ from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
-from texrs.papers.design.plan import Plan
-from texrs.papers.design.texture import DEEP, correct_colours, look_up, say_finish, stitch_tiles
+from texrs.papers.design.plan import Plan, Way
+from texrs.papers.design.texture import correct_colours, look_up, say_finish, stitch_tiles
 from texrs.papers.design.tiles import fill_holes
+from texrs.papers.design.ways import DEEP, find_obstacle, list_ways
 from texrs.source_map import SourceMap
 
-__all__ = ["choose_plan", "make_composite"]
+__all__ = ["choose_other", "choose_plan", "make_composite"]
 
 EQUAL = 0.02
 """Difference of scores below which two ways are equally good. The one that repeats less is then used."""
@@ -34,6 +35,15 @@ LEAST, SHARE = 192, 0.75
 """Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
 TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
+VARIED: tuple[Way, ...] = ("move", "sow")
+"""Ways whose tiles all differ. The tiles of the other ways are mirror images of the exemplar."""
+NEW: tuple[Way, ...] = ("cells", "sow")
+"""Ways with a new arrangement, which need a texture of some size."""
+BENT = 0.42
+"""Bending of cells above which a new arrangement of them is not used (90th percentile). Rectangles look rounded.
+
+Chosen by eye on half of 51 pictures.
+"""
 TRIAL = 0
 """Seed of all trials. Their copies are used again by the texture with this seed."""
 
@@ -46,7 +56,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
         arguments.watch("deform and complete", number / count)
         tile, which = divmod(number, len(plans))
         plan = plans[which]
-        if (plan.still and tile >= len(plan.mirrors)) or (which and arguments.density is not None):
+        if (plan.way not in VARIED and tile >= len(plan.mirrors)) or (which and arguments.density is not None):
             continue
         if seed == TRIAL and len(plans) == 1 and tile < len(plan.tiles):
             tiles.append(plan.tiles[tile])
@@ -72,46 +82,62 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         the same way.
 
     """
-    still = replace(plan, still=True)
-    ways = {"move": plan, "keep": still, "stitch": replace(still, stitched=True)}
     if plan.literal:
         return plan
-    if arguments.motion != "auto":
-        return ways[arguments.motion]
-    if plan.parts.courses:
-        return still
+    if arguments.way != "auto":
+        way = arguments.way
+        if way == "still":
+            way = "courses" if plan.parts.courses else "lattice" if plan.parts.lattice else way
+        obstacle = find_obstacle(plan, way)
+        if obstacle:
+            raise InvalidInput(f'way: must be another way than "{way}", because {obstacle}')
+        return replace(plan, way=way)
+    ways = list_ways(plan)
     if arguments.deformation != DeformationOptions():
         return plan
-    if plan.parts.kind == "grid":
-        # Moved cells of a grid show more seams than patches, and nothing else.
-        del ways["move"]
-    if plan.parts.lattice is not None:
-        # The stitcher does not keep its patches in step with a lattice.
-        del ways["stitch"]
+    if len(ways) == 1:
+        return replace(plan, way=ways[0])
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
-    made: dict[str, list[Tile]] = {}
+    made: dict[Way, list[Tile]] = {}
 
-    def judge_each() -> Mapping[str, Mapping[str, float]]:
+    def judge_each() -> Mapping[Way, Mapping[str, float]]:
         judge = exemplar.cached("judge of ways", lambda: Judge(exemplar))
         salience = measure_salience(exemplar.guidance, plan.parts.measure_depth(DEEP))
-        faults, use = {}, {}
-        for name, way in ways.items():
-            made[name], source, image = try_way(way, exemplar, arguments, list(ways).index(name) / len(ways))
+        faults: dict[Way, Faults] = {}
+        use: dict[Way, dict[str, float]] = {}
+        for number, name in enumerate(ways):
+            laid = try_way(replace(plan, way=name), exemplar, arguments, number / len(ways))
+            if laid is None:
+                continue
+            made[name], source, image = laid
             faults[name] = judge.measure(source, image, wrap=True)
             repetition, coverage = measure_use(salience, exemplar.shape, source)
             use[name] = {"repetition": round(repetition, 4), "coverage": round(coverage, 4)}
         scores = compare(faults)
-        return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in ways}
+        return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in faults}
 
     tried = exemplar.cached(key, judge_each)
     least = min(each["score"] for each in tried.values())
     equal = [name for name, each in tried.items() if each["score"] <= least + EQUAL]
     best = min(equal, key=lambda name: tried[name]["repetition"])
-    return replace(ways[best], tried=tried, tiles=made.get(best, ()))
+    return replace(plan, way=best, tried=tried, tiles=made.get(best, ()))
 
 
-def try_way(plan: Plan, exemplar: Exemplar, arguments: Arguments, done: float) -> tuple[list[Tile], SourceMap, Array]:
-    """Synthesise a small texture in one way, and return its tiles, source map and image."""
+def choose_other(plan: Plan) -> Plan:
+    """Return a plan with the best way that does not need a new arrangement, if the ways were tried."""
+    if plan.tried is None or plan.way not in NEW:
+        return plan
+    rest = {name: each for name, each in plan.tried.items() if name not in NEW}
+    return replace(plan, way=min(rest, key=lambda name: rest[name]["score"]), tiles=())
+
+
+def try_way(
+    plan: Plan, exemplar: Exemplar, arguments: Arguments, done: float
+) -> tuple[list[Tile], SourceMap, Array] | None:
+    """Synthesise a small texture in one way, and return its tiles, source map and image.
+
+    None if a new arrangement of its cells or elements is impossible, or bends the cells too much.
+    """
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
@@ -124,6 +150,24 @@ def try_way(plan: Plan, exemplar: Exemplar, arguments: Arguments, done: float) -
         copies=min(TILES, arguments.copies),
         watch=lambda stage, share: arguments.watch("try", done),
     )
-    tiles, composite = make_composite([plan], small, TRIAL)
+    try:
+        tiles, composite = make_composite([plan], small, TRIAL)
+    except InvalidInput:
+        if plan.way not in NEW:
+            raise
+        return None
+    if plan.way == "cells" and measure_bending(composite) > BENT:
+        return None
     image, _ = correct_colours(composite, look_up(composite, small), small)
     return tiles, composite, image
+
+
+def measure_bending(source: SourceMap) -> float:
+    """Return the bending of a texture: the 90th percentile of the absolute logarithm of its stretches."""
+    frames = source.jacobian_array()
+    if frames is None:
+        return 0.0
+    (a, b), (c, d) = np.moveaxis(np.asarray(frames, np.float64).reshape(-1, 2, 2), 0, -1)
+    most, least = np.hypot(a + d, b - c), np.hypot(a - d, b + c)
+    stretch = np.stack([most + least, np.abs(most - least)]) / 2
+    return float(np.quantile(np.abs(np.log(np.maximum(stretch, 1e-3))).max(axis=0), 0.9))

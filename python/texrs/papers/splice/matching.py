@@ -19,9 +19,9 @@ from texrs.errors import InvalidInput
 from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import split_foreground
-from texrs.papers.splice.placement import continue_points
 from texrs.papers.splice.texture_extension import Extension, count_elements, extend, lay_out, sow
 from texrs.point_sets import PointLayout, directions, match_points, nearest_distances, spacing
+from texrs.sowing import continue_points
 
 __all__ = [
     "Edit",

@@ -20,8 +20,8 @@ from texrs.errors import InvalidInput
 from texrs.limits._estimates import BEYOND
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import split_foreground
-from texrs.papers.splice.placement import sow_elements
 from texrs.point_sets import Fold, PointLayout
+from texrs.sowing import sow_elements
 
 __all__ = ["Extension", "count_elements", "extend", "sow"]
 

@@ -35,13 +35,14 @@ from texrs.elements._instances import find_sure_cells
 from texrs.exemplar.cells import Cells, fill_gaps
 from texrs.exemplar.shapes import mark_outlines
 from texrs.exemplar.symmetry import find_mirrors
+from texrs.mosaic import lay_cells
+from texrs.mosaic.charts import Charts
+from texrs.mosaic.choice import list_usable
+from texrs.mosaic.joining import Joined
+from texrs.mosaic.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.cells.cell_drawings import draw_cell_stages
-from texrs.papers.splice.cells.charts import Charts, draw_charts
-from texrs.papers.splice.cells.choice import list_usable, shortlist
-from texrs.papers.splice.cells.joining import Joined, join
 from texrs.papers.splice.cells.refinement import refine_charts
 from texrs.papers.splice.cells.strength import interpolate_layouts, take_own_cells
-from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.result import list_place, report_ways
 from texrs.papers.splice.texture_extension import lay_out
 from texrs.source_map import SourceMap
@@ -147,16 +148,10 @@ def splice_cells(
     wanted = _take_targets(b, size, cells.size, scale, seed)
     if strength < 1:
         wanted = interpolate_layouts(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
-    chosen = _list_shown(wanted)
     watch("cells", 0.2)
-    # Choose a cell for each target, bend it to the target's shape, and join the cells.
-    choices = shortlist(cells, wanted, chosen, turns=may_turn, seed=seed)
-    charts = draw_charts(cells, wanted, chosen, choices)
-    watch("cells", 0.6)
-    joined = join(a.image, cells, charts, size)
+    # Choose a cell for each target, bend it to the target's shape, join the cells, and correct stretched pixels.
+    charts, joined, places, frames = lay_cells(a.image, cells, wanted, turns=may_turn, seed=seed)
     watch("cells", 1.0)
-    # Compute source positions, and correct the pixels that a cell stretches.
-    places, frames = charts.places[joined.pixel], charts.measure_frames(joined.pixel, joined.chart)
     if refine:
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
     source = SourceMap.from_coordinates(
@@ -192,13 +187,6 @@ def _take_targets(
         return take_points(lay_out(b, beyond=True), b.mask.shape, size, unit, scale=scale, centre=centre)
 
     return _TARGETS.get_or_make(key, make)
-
-
-def _list_shown(wanted: Tessellation) -> NDArray[np.intp]:
-    """Return the indices of the targets that are visible in the output, from top to bottom."""
-    m = wanted.margin
-    rows = np.unique(wanted.labels[m:-m, m:-m]) - 1
-    return np.asarray(rows[np.lexsort((wanted.centre[rows, 1], wanted.centre[rows, 0]))], np.intp)
 
 
 def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.float64]:

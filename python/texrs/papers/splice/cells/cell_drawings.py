@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Labels
 from texrs.elements import ElementAnalysis
 from texrs.exemplar.cells import Cells
-from texrs.papers.splice.cells.charts import Charts
-from texrs.papers.splice.cells.joining import Joined
-from texrs.papers.splice.cells.tessellation import Tessellation
+from texrs.mosaic.charts import Charts
+from texrs.mosaic.joining import Joined
+from texrs.mosaic.tessellation import Tessellation
 from texrs.papers.splice.stage_drawings import BLUE, GREEN, RED, Stages, draw_outlines, mark_points, to_picture
 
 __all__ = ["draw_cell_stages"]

@@ -17,8 +17,8 @@ from texrs._typing import Floats, Progress
 from texrs.elements import ElementAnalysis
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.shapes import mark_outlines
-from texrs.papers.splice.cells.charts import Charts
-from texrs.papers.splice.cells.joining import Joined
+from texrs.mosaic.charts import Charts
+from texrs.mosaic.joining import Joined
 from texrs.papers.splice.refine import Draft, Refinement, correct_draft
 
 __all__ = ["refine_charts"]

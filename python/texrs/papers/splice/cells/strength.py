@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import paint
-from texrs.papers.splice.cells.outlines import match_outlines, rematch_outlines
-from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, take_cells
+from texrs.mosaic.outlines import match_outlines, rematch_outlines
+from texrs.mosaic.tessellation import Tessellation, finish_cells, take_cells
 from texrs.point_sets import match_points
 
 __all__ = ["interpolate_layouts", "take_own_cells"]

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
-from texrs.papers.splice.cells.tessellation import take_cells
-from texrs.papers.splice.placement import continue_points
+from texrs.mosaic.tessellation import take_cells
 from texrs.papers.splice.texture_extension import lay_out
 from texrs.point_sets import match_points, nearest_distances, spacing
+from texrs.sowing import continue_points
 
 __all__ = ["Targets", "interpolate_layouts", "take_own_points", "take_points"]
 

@@ -7,7 +7,7 @@ image.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,12 @@ from texrs._typing import Labels
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_moments, paint, trace
-from texrs.papers.splice.cells.continuation import continue_cells
-from texrs.papers.splice.placement import continue_points
+from texrs.mosaic.continuation import continue_cells, grow_cells
+from texrs.mosaic.dissection import dissect
 from texrs.point_sets import PointLayout
+from texrs.sowing import continue_points
 
-__all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
+__all__ = ["Tessellation", "finish_cells", "take_cells", "take_periodic_cells", "take_points"]
 
 Points = NDArray[np.float64]
 
@@ -28,8 +29,14 @@ MARGIN = 1.0
 """Width, in cell sizes, of the margin with target cells. It makes cells at the border of the output complete."""
 SAMPLES = 640
 """Maximum number of samples along each axis for measuring the areas of Voronoi cells."""
+FILLED, RECTANGLES = 0.85, 0.6
+"""Share of its bounding box that a rectangular cell fills, and least share of such cells for a wall of rectangles."""
+REPEATED, SAME = 0.5, 0.2
+"""Largest cell of a periodic output, as a share of its size. Distance of the centres of copies, in cell sizes."""
 SLIVER = 0.2
 """Minimum area of a target cell, as a share of the median area. Smaller cells are merged into their neighbours."""
+SCRAP = 0.03
+"""The same for rectangles of given sizes, which leave scraps of single pixels only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,10 +58,14 @@ class Tessellation:
     scale : float
         Scale factor of the layout.
     continued : str
-        How the layout continues beyond its image: "lattice", "wrap", "quilted" (grown from patches), "reflected", or
-        "" if it does not continue.
+        How the layout continues beyond its image: "lattice", "wrap", "quilted" (grown from patches), "dissected"
+        (rectangles without gaps), "reflected", or "" if it does not continue.
     start : (n, 2) float64, optional
         Origin of each cell among A's own cells, if the strength is below 1.
+    wrap : (bool, bool)
+        Axes along which the output is periodic. The margin then shows copies of the cells.
+    same : (n,) int, optional
+        Index of the cell that each cell is a copy of, or its own index. Default: no copies.
 
     """
 
@@ -66,11 +77,22 @@ class Tessellation:
     scale: float
     continued: str
     start: Points | None = None
+    wrap: tuple[bool, bool] = (False, False)
+    same: NDArray[np.intp] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
         """Return the number of rows and columns of the output."""
         return self.labels.shape[0] - 2 * self.margin, self.labels.shape[1] - 2 * self.margin
+
+    @property
+    def shown(self) -> NDArray[np.intp]:
+        """Return the indices of the cells that are visible in the output, each once, from top to bottom."""
+        m = self.margin
+        rows = np.unique(self.labels[m:-m, m:-m]) - 1
+        if self.same is not None:
+            rows = np.unique(self.same[rows])
+        return np.asarray(rows[np.lexsort((self.centre[rows, 1], self.centre[rows, 0]))], np.intp)
 
 
 def take_cells(
@@ -100,6 +122,72 @@ def take_cells(
     outlines = shapes * unit + (np.array(size) - 1) / 2
     labels = paint(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
     return finish_cells(labels, margin, scale * unit, continued)
+
+
+def take_periodic_cells(cells: Cells, size: tuple[int, int], wrap: tuple[bool, bool], *, seed: int) -> Tessellation:
+    """Return cells in the arrangement of a texture's own cells, on an output that is periodic along some axes.
+
+    Raises
+    ------
+    InvalidInput
+        The texture has fewer than three complete cells, or the output is too small for them.
+
+    """
+    sides = np.ptp(cells.outlines, axis=1)
+    square = (cells.area >= FILLED * sides.prod(axis=1)) & (cells.area >= SLIVER * cells.size**2)
+    if cells.whole.any() and square[cells.whole].mean() >= RECTANGLES:
+        boxes, _ = dissect(sides[square & cells.whole], size, seed=seed)
+        outlines = outline_boxes(boxes, cells.outlines.shape[1])
+        continued = "dissected"
+    else:
+        outlines, continued = grow_cells(cells, size, wrap, seed=seed), "quilted"
+    extents = np.ptp(outlines, axis=1)
+    if (extents.max(axis=0) > REPEATED * np.array(size)).any():
+        raise InvalidInput(f"size: must be at least {1 / REPEATED:g} times as large as the largest cell, got {size}")
+    margin = int(np.ceil(max(MARGIN * cells.size, float(extents.max()) + 2)))
+    # Later outlines cover earlier ones. All copies of a cell are painted together, so that all overlap in one order.
+    shifts = [np.array([r, c]) * size for r in steps(wrap[0]) for c in steps(wrap[1])]
+    copies = (outlines[:, np.newaxis] + np.array(shifts)[:, np.newaxis]).reshape(-1, *outlines.shape[1:])
+    labels = paint(copies + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
+    found = finish_cells(labels, margin, 1.0, continued, SLIVER if continued == "quilted" else SCRAP)
+    return replace(found, wrap=wrap, same=find_copies(found, wrap))
+
+
+def outline_boxes(boxes: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the outlines of rectangles as equally spaced points (row, column), (n, count, 2)."""
+    top, left, bottom, right = boxes.T[:, :, np.newaxis]
+    height, width = bottom - top, right - left
+    # Go around each rectangle: along its top, its right, its bottom and its left side.
+    at = np.arange(count) / count * 2 * (height + width)
+    down, back = np.clip(at - width, 0, height), np.clip(at - width - height, 0, width)
+    rows = top + down - np.clip(at - 2 * width - height, 0, height)
+    columns = left + np.clip(at, 0, width) - back
+    return np.stack([rows, columns], axis=-1)
+
+
+def steps(wrap: bool) -> tuple[int, ...]:
+    """Return the shifts of the copies along an axis, in sizes of the output."""
+    return (0, -1, 1) if wrap else (0,)
+
+
+def find_copies(found: Tessellation, wrap: tuple[bool, bool]) -> NDArray[np.intp]:
+    """Return the cell that represents each cell of a periodic output: the most central one at its place."""
+    size, edge = np.array(found.size, np.float64), np.zeros(len(found.area), bool)
+    for axis, cyclic in enumerate(wrap):
+        for end in (0, -1) if cyclic else ():
+            edge[np.unique(np.take(found.labels, end, axis)) - 1] = True
+    away = np.where(wrap, np.abs(found.centre / size - 0.5), 0).max(axis=1)
+    same, kept = np.arange(len(found.area)), np.zeros(0, np.intp)
+    # Copies that the border of the canvas cuts come last, because their centres are displaced.
+    for k in np.lexsort((away, edge)).tolist():
+        apart = found.centre[kept] - found.centre[k]
+        apart -= np.where(wrap, np.round(apart / size) * size, 0)
+        near = np.hypot(*apart.T) / np.sqrt(found.area[k])
+        if len(kept) and (near.min() < SAME or edge[k]):
+            same[k] = kept[near.argmin()]
+        else:
+            kept = np.append(kept, k)
+    return np.asarray(same, np.intp)
 
 
 def take_points(
@@ -143,15 +231,18 @@ def take_points(
     return finish_cells(labels.astype(np.int32), margin, factor, continued)
 
 
-def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
-    """Merge small pieces of cells into their neighbours, number the remaining cells and trace their outlines."""
+def finish_cells(labels: Labels, margin: int, scale: float, continued: str, sliver: float = SLIVER) -> Tessellation:
+    """Trace the outlines of labelled cells.
+
+    Pieces smaller than ``sliver`` median areas are merged into their neighbours first.
+    """
     from scipy.ndimage import distance_transform_edt
     from skimage.measure import label
 
     pieces = label(labels, connectivity=1, background=0)
     area = np.bincount(pieces.ravel())
     area[0] = 0
-    keep = area >= SLIVER * np.median(area[area >= 0.1 * area.max()])
+    keep = area >= sliver * np.median(area[area >= 0.1 * area.max()])
     kept = np.where(keep, np.cumsum(keep), 0)[pieces]
     nearest = distance_transform_edt(kept == 0, return_distances=False, return_indices=True)
     labels = kept[tuple(nearest)].astype(np.int32)

@@ -13,7 +13,7 @@ from texrs._typing import Array, Bools
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.shapes import mark_outlines
 from texrs.kernels.gather import gather
-from texrs.papers.splice.cells.charts import BAND, Charts
+from texrs.mosaic.charts import BAND, Charts
 
 __all__ = ["Joined", "join"]
 
@@ -81,6 +81,8 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
 
 def _fill(pixel: NDArray[np.uint32], charts: Charts) -> None:
     """Fill pixels that no chart covers from the chart whose outline is nearest."""
+    from scipy.ndimage import distance_transform_edt
+
     if not (pixel == FREE).any():
         return
     best = np.full(pixel.shape, -np.inf, np.float32)
@@ -93,3 +95,7 @@ def _fill(pixel: NDArray[np.uint32], charts: Charts) -> None:
         better = free & (depth > best[box])
         pixel[box] = np.where(better, number, pixel[box])
         best[box] = np.where(better, depth, best[box])
+    # Gaps that are farther from all outlines repeat the nearest pixel.
+    free = pixel == FREE
+    if free.any():
+        pixel[...] = pixel[tuple(distance_transform_edt(free, return_distances=False, return_indices=True))]

@@ -1,5 +1,7 @@
 """Continue the arrangement of points beyond their image by sowing, because repeated reflections are visible.
 
+An arrangement can also be sown on a periodic output, without the image itself.
+
 Nothing is sown if a lattice continues, or if the requested box is near the image. Otherwise the points are drawn as
 discs, and the drawing is grown by quilting, which avoids cuts through discs. The points are then read from the grown
 drawing. Points of the image itself do not change. Elements are sown in the same way, so that neighbours are also
@@ -9,7 +11,7 @@ neighbours in the image. Elements that the border cuts are not sown.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,10 @@ from texrs.point_sets import PointLayout, nearest_distances
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["Sown", "continue_points", "sow_elements"]
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+__all__ = ["Sown", "continue_points", "sow_elements", "sow_periodic"]
 
 Points = NDArray[np.float64]
 Reals = NDArray[np.float64]
@@ -124,7 +129,7 @@ def sow_elements(
     if found is None:
         return None
     closest = _measure_closest(own, large)
-    found = _push_apart(found, own, large, closest)
+    found = _push_apart(found, own, large, closest, len(own))
     share = math.pi * float((radius**2).sum()) / (shape[0] * shape[1])
     found = _fill_gaps(found, large, ends, low, high, layout.scale / FINE, share, min(1.0, closest))
     of = _vary(found.points, found.of, len(own), large, AWAY * layout.scale)
@@ -164,33 +169,9 @@ def _sow(
 ) -> Sown:
     """Quilt a drawing of the points, with ``unit`` pixels per pixel of the image, and read the points from it."""
     first = ends[0]
-    sides = tuple(round(n * unit) for n in (ends[1] - first + 1).tolist())
-    places = (points - first) * unit
-    disc = _draw(places, sides, DISC * scale * unit)
-    picture = Picture(disc[..., np.newaxis], SourceMap.identity(sides), disc)
     size = tuple(int(np.ceil(n)) + 1 for n in (high - low) * unit)
-    patch = min(PATCH * scale * unit, min(sides) / 2)
-    # Enlarge the drawing of the points by quilting.
-    grown = quilt(
-        [picture],
-        (size[0], size[1]),
-        patch=max(8, round(patch)),
-        overlap=max(3, round(OVERLAP * patch)),
-        wrap=(False, False),
-        seed=0,
-        progress=lambda share: None,
-    )
-    # Read the points from the quilt. Each pixel that is copied from a point's pixel becomes a point.
-    drawn = np.flatnonzero(((places >= 0) & (places <= np.array(sides) - 1)).all(axis=1))
-    pixel = np.rint(places[drawn]).astype(np.intp)
-    number = np.zeros(sides, np.int32)
-    number[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(drawn) + 1)
-    at = np.clip(np.rint(grown.coordinates), 0, np.array(sides) - 1).astype(np.intp)
-    shown = number[at[..., 0], at[..., 1]]
-    rows, columns = np.nonzero(shown)
-    which = shown[rows, columns] - 1
-    of = drawn[which]
-    sown = np.round(low + (np.stack([rows, columns], axis=-1) + places[of] - pixel[which]) / unit, 6)
+    at, of = _quilt_points(points, scale, ends, (size[0], size[1]), unit, (False, False), 0)
+    sown = np.round(low + at / unit, 6)
     beyond = ~((sown >= first) & (sown <= ends[1])).all(axis=1)
     # Keep the points of the image itself, and add sown points outside of it.
     own = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
@@ -201,6 +182,101 @@ def _sow(
     return Sown(both.points[kept], both.of[kept])
 
 
+def _quilt_points(
+    points: Points,
+    scale: float,
+    ends: tuple[Points, Points],
+    size: tuple[int, int],
+    unit: float,
+    wrap: tuple[bool, bool],
+    seed: int,
+) -> tuple[Points, NDArray[np.intp]]:
+    """Quilt a drawing of points, and return the points in the quilt, in its pixels, and the original of each."""
+    first = ends[0]
+    sides = tuple(round(n * unit) for n in (ends[1] - first + 1).tolist())
+    places = (points - first) * unit
+    disc = _draw(places, sides, DISC * scale * unit)
+    picture = Picture(disc[..., np.newaxis], SourceMap.identity(sides), disc)
+    patch = min(PATCH * scale * unit, min(sides) / 2)
+    grown = quilt(
+        [picture],
+        size,
+        patch=max(8, round(patch)),
+        overlap=max(3, round(OVERLAP * patch)),
+        wrap=wrap,
+        seed=seed,
+        progress=lambda share: None,
+    )
+    # Each pixel that is copied from a point's pixel becomes a point.
+    drawn = np.flatnonzero(((places >= 0) & (places <= np.array(sides) - 1)).all(axis=1))
+    pixel = np.rint(places[drawn]).astype(np.intp)
+    number = np.zeros(sides, np.int32)
+    number[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(drawn) + 1)
+    at = np.clip(np.rint(grown.coordinates), 0, np.array(sides) - 1).astype(np.intp)
+    shown = number[at[..., 0], at[..., 1]]
+    rows, columns = np.nonzero(shown)
+    which = shown[rows, columns] - 1
+    of = drawn[which]
+    return np.stack([rows, columns], axis=-1) + places[of] - pixel[which], of
+
+
+def sow_periodic(
+    points: Points, radius: Reals, scale: float, shape: tuple[int, ...], size: tuple[int, int], *, seed: int
+) -> Sown | None:
+    """Return elements in the arrangement of an image's elements, on an output that is periodic along both axes.
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        Centres of the elements that the border does not cut.
+    radius : (n,) float64
+        Radius of each element in pixels. Sown elements do not overlap, unless elements overlap in the image.
+    scale : float
+        Usual distance of neighbours, in pixels.
+    shape : (rows, columns)
+        Shape of the image.
+    size : (rows, columns)
+        Size of the output.
+    seed : int
+        Seed of the arrangement.
+
+    Returns
+    -------
+    Sown or None
+        None if the image has too few elements, or is too small for an arrangement.
+
+    """
+    # Exclude the margin where elements can be cut, because it does not show how dense they are.
+    margin = float(np.median(radius)) if len(radius) else 0.0
+    ends = np.full(2, margin), np.array(shape) - 1 - margin
+    unit = float(np.clip(LARGE * scale / max(size), *DRAWN)) / scale
+    if len(points) < FEWEST or (ends[1] - ends[0]).min() < 2 * SMALLEST * scale or max(size) * unit > 4 * LARGE:
+        return None
+    drawn, period = (max(8, round(size[0] * unit)), max(8, round(size[1] * unit))), np.array(size, np.float64)
+    at, of = _quilt_points(points, scale, ends, drawn, unit, (True, True), seed)
+    found, closest = Sown(np.round(at * size / drawn, 6) % period, of), _measure_closest(points, radius)
+    kept = _keep_apart(found, 0, points, 0.0, radius, ROUGH * closest, period)
+    found = _push_apart(Sown(found.points[kept], found.of[kept]), points, radius, closest, 0, period)
+    inner = ((points >= ends[0]) & (points <= ends[1])).all(axis=1)
+    share = math.pi * float((radius[inner] ** 2).sum()) / float(np.prod(ends[1] - ends[0]))
+    nothing, room = (np.full(2, np.inf), np.full(2, -np.inf)), min(1.0, closest)
+    found = _fill_gaps(found, radius, nothing, np.zeros(2), period - 1, scale / FINE, share, room, period)
+    of = _vary(found.points, found.of, 0, radius, AWAY * scale, period)
+    return Sown(found.points % period, of)
+
+
+def _search(points: Points, period: Reals | None) -> cKDTree:
+    """Return an index of points for searches of neighbours, which continue over the border of a periodic output."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points if period is None else points % period, boxsize=period)
+
+
+def _shorten(away: Points, period: Reals | None) -> Points:
+    """Return the shortest of the equivalent displacements on a periodic output."""
+    return away if period is None else away - np.round(away / period) * period
+
+
 def _measure_closest(points: Points, radius: Reals) -> float:
     """Return the 10 % quantile of the elements' least distances, each divided by the sum of two radii."""
     apart = np.hypot(*np.moveaxis(points[:, np.newaxis] - points, -1, 0)) / (radius[:, np.newaxis] + radius)
@@ -208,16 +284,16 @@ def _measure_closest(points: Points, radius: Reals) -> float:
     return float(np.clip(np.quantile(apart.min(axis=1), 0.1), *CLOSE))
 
 
-def _push_apart(found: Sown, points: Points, radius: Reals, closest: float) -> Sown:
+def _push_apart(
+    found: Sown, points: Points, radius: Reals, closest: float, own: int, period: Reals | None = None
+) -> Sown:
     """Push sown elements apart if they are closer than elements of the image, and remove elements without room."""
-    from scipy.spatial import cKDTree
-
-    at, own = found.points.copy(), len(points)
+    at = found.points.copy()
     for _ in range(ROUNDS):
-        first, second = cKDTree(at).query_pairs(2 * float(radius.max()), output_type="ndarray").T
+        first, second = _search(at, period).query_pairs(2 * float(radius.max()), output_type="ndarray").T
         order = np.lexsort((second, first))
         first, second = first[order], second[order]
-        away = at[second] - at[first]
+        away = _shorten(at[second] - at[first], period)
         as_there = (np.abs(away - (points[found.of[second]] - points[found.of[first]])) < 1).all(axis=1)
         length = np.maximum(np.hypot(*away.T), 1e-9)
         lack = np.where(as_there, 0, closest * (radius[found.of[first]] + radius[found.of[second]]) - length)
@@ -226,7 +302,7 @@ def _push_apart(found: Sown, points: Points, radius: Reals, closest: float) -> S
             np.add.at(at, who, sign * push)
         at[:own] = found.points[:own]
     pushed = Sown(np.round(at, 6), found.of)
-    kept = _keep_apart(pushed, own, points, 0.0, radius, TIGHT * closest)
+    kept = _keep_apart(pushed, own, points, 0.0, radius, TIGHT * closest, period)
     return Sown(pushed.points[kept], pushed.of[kept])
 
 
@@ -239,13 +315,12 @@ def _fill_gaps(
     step: float,
     share: float,
     room: float,
+    period: Reals | None = None,
 ) -> Sown:
     """Fill the largest gaps with elements until these cover their share of the box, or no gap has room."""
-    from scipy.spatial import cKDTree
-
     sides = [np.arange(a, b + step / 2, step) for a, b in zip(low, high, strict=True)]
     places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
-    away, near = cKDTree(found.points).query(places, k=min(8, len(found.points)))
+    away, near = _search(found.points, period).query(places, k=range(1, 1 + min(8, len(found.points))))
     gap = np.min(away - radius[found.of][near], axis=1)
     gap[((places >= ends[0]) & (places <= ends[1])).all(axis=1)] = 0
     at, of = [*found.points], [*found.of.tolist()]
@@ -256,14 +331,14 @@ def _fill_gaps(
         at.append(places[k])
         of.append(which)
         lack -= math.pi * float(radius[which]) ** 2
-        gap = np.minimum(gap, np.hypot(*(places - places[k]).T) - radius[which])
+        gap = np.minimum(gap, np.hypot(*_shorten(places - places[k], period).T) - radius[which])
     return Sown(np.round(np.array(at), 6), np.array(of))
 
 
-def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float) -> NDArray[np.intp]:
+def _vary(
+    at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float, period: Reals | None = None
+) -> NDArray[np.intp]:
     """Replace sown elements by others of similar size if the same element is near. Begin next to the image."""
-    from scipy.spatial import cKDTree
-
     count = len(radius)
     turn = (np.arange(count) - np.arange(count)[:, np.newaxis]) % count
     # For each element, list the elements of similar size, itself first. Ties have different orders for different
@@ -271,13 +346,13 @@ def _vary(at: Points, of: NDArray[np.intp], own: int, radius: Reals, far: float)
     alike = np.lexsort((turn, np.abs(radius - radius[:, np.newaxis])), axis=1)[:, :ALIKE]
     middle = at[:own].mean(axis=0) if own else at.mean(axis=0)
     order = np.argsort(np.hypot(*(at[own:] - middle).T), kind="stable") + own
-    near = cKDTree(at).query_ball_point(at, far)
+    near = _search(at, period).query_ball_point(at if period is None else at % period, far)
     placed = np.arange(len(at)) < own
     new = of.copy()
     for k in order.tolist():
         others = np.array([n for n in near[k] if placed[n]], np.intp)
         away = np.full(len(radius), np.inf)
-        np.minimum.at(away, new[others], np.hypot(*(at[others] - at[k]).T))
+        np.minimum.at(away, new[others], np.hypot(*_shorten(at[others] - at[k], period).T))
         new[k] = alike[of[k]][np.argmax(away[alike[of[k]]])]
         placed[k] = True
     return new
@@ -293,16 +368,20 @@ def _draw(places: Points, sides: tuple[int, int], radius: float) -> Floats:
 
 
 def _keep_apart(
-    found: Sown, own: int, points: Points, apart: float, radius: Reals | None, closest: float = 0.0
+    found: Sown,
+    own: int,
+    points: Points,
+    apart: float,
+    radius: Reals | None,
+    closest: float = 0.0,
+    period: Reals | None = None,
 ) -> NDArray[np.intp]:
     """Return the indices of points that are not too close to earlier points. The first ``own`` points are all kept."""
-    from scipy.spatial import cKDTree
-
     far = apart if radius is None else 2 * float(radius.max())
-    pairs = cKDTree(found.points).query_pairs(far, output_type="ndarray")
+    pairs = _search(found.points, period).query_pairs(far, output_type="ndarray")
     if radius is not None:
         one, two = found.of[pairs[:, 0]], found.of[pairs[:, 1]]
-        away = found.points[pairs[:, 1]] - found.points[pairs[:, 0]]
+        away = _shorten(found.points[pairs[:, 1]] - found.points[pairs[:, 0]], period)
         # Keep pairs that have the same offset as their originals in the image, even if they are close to each other.
         copied = (np.abs(away - (points[two] - points[one])) < 1).all(axis=1)
         pairs = pairs[~copied & (np.hypot(*away.T) < closest * (radius[one] + radius[two]))]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_profiles
 from texrs.exemplar.shapes import list_borders
-from texrs.papers.splice.cells.tessellation import Tessellation
+from texrs.mosaic.tessellation import Tessellation
 
 __all__ = ["TURNS", "Shortlist", "shortlist"]
 
@@ -148,9 +148,12 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
 
 
 def list_neighbours(wanted: Tessellation) -> list[NDArray[np.intp]]:
-    """Return the indices of the neighbours of each target."""
-    flat = wanted.labels.ravel().astype(np.int64) - 1
+    """Return the indices of the neighbours of each target, without copies of a periodic output."""
+    same = np.arange(len(wanted.area)) if wanted.same is None else wanted.same
+    flat = same[wanted.labels.ravel() - 1].astype(np.int64)
     one, other = (flat[side] for side in list_borders(wanted.labels))
+    apart = one != other
+    one, other = one[apart], other[apart]
     both = np.unique(np.concatenate([one << 32 | other, other << 32 | one]))
     ends = np.searchsorted(both >> 32, np.arange(len(wanted.area) + 1))
     return [both[a:b] & 0xFFFFFFFF for a, b in pairwise(ends.tolist())]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from texrs._typing import Floats, Labels
 from texrs.exemplar.cells import Cells
 from texrs.kernels.gather import gather
-from texrs.papers.splice.cells.choice import Shortlist
-from texrs.papers.splice.cells.outlines import Matched, interpolate, match_outlines, rematch_outlines
-from texrs.papers.splice.cells.tessellation import Tessellation
+from texrs.mosaic.choice import Shortlist
+from texrs.mosaic.outlines import Matched, interpolate, match_outlines, rematch_outlines
+from texrs.mosaic.tessellation import Tessellation
 
 __all__ = ["Charts", "draw_charts"]
 
@@ -72,6 +72,8 @@ class Charts:
         Depth of each pixel inside the target, in pixels. Pixels outside have a negative depth.
     places : (n, 2) float32
         Source position in A of each pixel.
+    size : (int, int)
+        Rows and columns of the output.
 
     """
 
@@ -84,11 +86,13 @@ class Charts:
     sides: NDArray[np.intp]
     depth: Floats
     places: Floats
+    size: tuple[int, int]
 
-    def box(self, k: int) -> tuple[slice, slice]:
-        """Return the slices of a box in the output."""
-        (top, left), (rows, columns) = self.corner[k], self.sides[k]
-        return slice(int(top), int(top + rows)), slice(int(left), int(left + columns))
+    def box(self, k: int) -> tuple[NDArray[np.intp], ...]:
+        """Return the indices of a box in the output. They begin again at the border of a periodic output."""
+        return np.ix_(
+            *((first + np.arange(n)) % m for first, n, m in zip(self.corner[k], self.sides[k], self.size, strict=True))
+        )
 
     def measure_frames(self, pixel: NDArray[np.integer], chart: NDArray[np.integer]) -> Floats:
         """Return the Jacobians (..., 2, 2) of source positions at given pixels of charts, by central differences."""
@@ -110,7 +114,8 @@ def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], ch
     parts = [_choose(cells, wanted, chosen[g], choices.part(g), unit) for g in groups]
     source, turn, scale, found = (np.concatenate(p) for p in zip(*parts, strict=True))
     first, corner, sides, depth = _measure_depths(wanted, chosen, band, max(1.0, SMOOTH * unit))
-    charts = Charts(chosen, source, turn, scale, first, corner, sides, depth, np.empty((len(depth), 2), np.float32))
+    places = np.empty((len(depth), 2), np.float32)
+    charts = Charts(chosen, source, turn, scale, first, corner, sides, depth, places, wanted.size)
     count = int(np.clip(np.ceil(np.median(sides) / KNOT), *GRID))
     shown, number = np.unique(source, return_inverse=True)
     fields = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2, max(1.0, SMOOTH * unit))
@@ -185,7 +190,9 @@ def _measure_depths(
         box = boxes[target]
         signed = _measure_depth(wanted.labels, target + 1, box, pad, smooth)
         first = np.array([s.start - pad - margin for s in box])
-        low, high = np.maximum(first, 0), np.minimum(first + signed.shape, size)
+        # The box of a periodic output continues beyond its border.
+        low = np.where(wanted.wrap, first, np.maximum(first, 0))
+        high = np.where(wanted.wrap, first + signed.shape, np.minimum(first + signed.shape, size))
         cut = tuple(slice(a - f, b - f) for a, b, f in zip(low, high, first, strict=True))
         corners.append(low)
         sides.append(high - low)

@@ -21,7 +21,7 @@ from texrs.point_sets import PointLayout, continue_on_lattice
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["continue_cells"]
+__all__ = ["continue_cells", "grow_cells"]
 
 Points = NDArray[np.float64]
 
@@ -51,6 +51,8 @@ Both are in squared cell sizes.
 """
 BESIDE = 0.5
 """Distance beyond the image up to which cells at the border are completed by reflection, in cell sizes."""
+AROUND = 2.0
+"""Margin of copies around a periodic drawing, in cell sizes. It completes the cells at the border."""
 PATCH, OVERLAP = 4.0, 1.2
 """Side of the patches of the drawing, and overlap of two patches, in cell sizes."""
 
@@ -114,7 +116,22 @@ def continue_cells(
     if sites is not None:
         places, of = sites
         return _copy(cells, usable[of], places, np.zeros((len(of), 2), bool), centre) * scale, scale, "lattice"
-    return _grow(cells, far, seed), scale, "quilted"
+    unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
+    size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
+    outlines = _grow(cells, size, unit, seed)
+    return (outlines - (np.array(size) - 1) / 2) / unit, scale, "quilted"
+
+
+def grow_cells(cells: Cells, size: tuple[int, int], wrap: tuple[bool, bool], *, seed: int) -> NDArray[np.float64]:
+    """Return outlines in the arrangement of the cells, (n, P, 2), on an output that is periodic along some axes.
+
+    The outlines are in output pixels. They cover the output and a margin, and a cell near a border is listed once.
+    """
+    unit = float(np.clip(LARGE * cells.size / max(size), *DRAWN))
+    drawn = (round(size[0] * unit / cells.size), round(size[1] * unit / cells.size))
+    outlines = _grow(cells, drawn, unit, seed, wrap)
+    factor = np.array(size) / drawn
+    return (outlines + 0.5) * factor - 0.5
 
 
 def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, centre: Points) -> NDArray[np.float64]:
@@ -153,30 +170,34 @@ def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
     return np.asarray(trace(numbered, np.arange(1, int(numbered.max()) + 1)) - np.array(margin), np.float64)
 
 
-def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
-    """Quilt a drawing of the joints, and return the outlines of the cells in it.
+def _grow(
+    cells: Cells, size: tuple[int, int], unit: float, seed: int, wrap: tuple[bool, bool] = (False, False)
+) -> NDArray[np.float64]:
+    """Quilt a drawing of the joints, and return the outlines of the cells in it, in its pixels.
 
     Seams of the quilt cut some cells and merge others. Therefore cells are read from the quilt in two ways, and the
     result with fewer torn cells is used. The first way labels the areas that the lines enclose. The second way places
     each complete cell that is mostly visible.
     """
-    unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
-    size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
     drawing = _draw(cells, unit)
     picture = Picture(drawing[..., None], SourceMap.identity(drawing.shape), np.maximum(drawing - 0.5, 0))
-    best, least = np.zeros(size, np.int32), np.inf
+    # A periodic drawing is read with a margin, so that cells at its border are complete.
+    margin = [min(n, round(AROUND * unit)) if cyclic else 0 for n, cyclic in zip(size, wrap, strict=True)]
+    around = [(m, m) for m in margin]
+    best, least = np.zeros([n + 2 * m for n, m in zip(size, margin, strict=True)], np.int32), np.inf
     for attempt in range(TRIALS):
         grown = quilt(
             [picture],
             size,
             patch=round(PATCH * unit),
             overlap=round(OVERLAP * unit),
-            wrap=(False, False),
+            wrap=wrap,
             seed=seed + attempt,
             progress=lambda share: None,
         )
-        drawn = grown.render(drawing, interpolation="nearest")
-        whole = _stamp(cells, grown.coordinates, np.array(drawing.shape) / cells.labels.shape, drawn)
+        drawn = np.pad(grown.render(drawing, interpolation="nearest"), around, mode="wrap")
+        coordinates = np.pad(grown.coordinates, [*around, (0, 0)], mode="wrap")
+        whole = _stamp(cells, coordinates, np.array(drawing.shape) / cells.labels.shape, drawn)
         # Keep the labels with the fewest torn cells.
         for labels in (_enclose(drawn, unit), whole):
             torn = _measure_torn(labels, unit)
@@ -188,8 +209,11 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
         raise InvalidInput(
             "layout: its cells cannot be continued over the whole output; use a smaller size or a larger image"
         )
-    outlines = trace(best, np.arange(1, int(best.max()) + 1))
-    return (outlines - (np.array(size) - 1) / 2) / unit
+    outlines = trace(best, np.arange(1, int(best.max()) + 1)) - np.array(margin)
+    centre = outlines.mean(axis=1)
+    # Each cell of a periodic drawing has a centre inside it.
+    inside = [(centre[:, k] >= -0.5) & (centre[:, k] < n - 0.5) for k, n in enumerate(size) if wrap[k]]
+    return np.asarray(outlines[np.all(inside, axis=0)] if inside else outlines, np.float64)
 
 
 def _enclose(drawn: Floats, unit: float) -> Labels:
