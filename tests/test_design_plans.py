@@ -5,9 +5,8 @@ import pytest
 
 import texrs
 from texrs import SourceMap, samples
-from texrs._comparison_of_ways import Judge, compare
+from texrs._comparison_of_ways import EQUAL, Judge, compare
 from texrs.errors import InvalidInput
-from texrs.papers.design.trials import EQUAL
 
 
 @pytest.fixture(scope="module")

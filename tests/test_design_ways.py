@@ -128,5 +128,5 @@ def test_a_way_that_an_exemplar_does_not_allow_is_refused(way, reason):
 
 def test_cells_need_room():
     sample = samples.pebbles((128, 128))
-    with pytest.raises(InvalidInput, match="^size: must be at least 2 times as large as the largest cell"):
+    with pytest.raises(InvalidInput, match="^size: must be at least 1.4 times as large as the largest cell"):
         texrs.design(sample.image, 32, way="cells", elements=texrs.ElementOptions(labels=sample.labels))

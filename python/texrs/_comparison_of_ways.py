@@ -18,7 +18,7 @@ Repetition is not a figure, because it does not agree with the eye.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import TypeVar
@@ -30,10 +30,10 @@ from texrs._arrays import as_image, as_rgb, guidance
 from texrs._progress import ask
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar import Exemplar
-from texrs.metrics import Seam, find_breaks, find_seam, list_neighbours
+from texrs.metrics import Seam, find_breaks, find_seam, list_neighbours, measure_salience, measure_use
 from texrs.source_map import SourceMap
 
-__all__ = ["Faults", "Judge", "compare"]
+__all__ = ["EQUAL", "Faults", "Judge", "choose", "compare", "try_ways"]
 
 CELL, ORIENTATIONS = 8, 6
 """Side of the cells whose energies are compared, in pixels, and number of orientations of the filters."""
@@ -52,6 +52,8 @@ SOFT, APART = 6.0, 8
 """Standard deviation for averaging tones, and their distance from a seam when they are compared, in pixels."""
 PAIRS = 20_000
 """Number of pairs of neighbours for estimating the shares of the exemplar, to about 1 %."""
+EQUAL = 0.02
+"""Difference of scores below which two ways are equally good."""
 FLOORS = {
     "irregular": 0.05,
     "broken": 0.003,
@@ -88,6 +90,43 @@ def compare(faults: Mapping[Name, Faults]) -> dict[Name, float]:
     table = {name: np.array([asdict(each)[key] for key in FLOORS]) for name, each in faults.items()}
     usual = np.mean(list(table.values()), axis=0) + np.array(list(FLOORS.values()))
     return {name: round(float(np.sqrt(row / usual).mean()), 4) for name, row in table.items()}
+
+
+def try_ways(
+    exemplar: Exemplar, depth: Floats, ways: Mapping[Name, Callable[[], tuple[SourceMap, Array] | None]]
+) -> dict[Name, dict[str, float]]:
+    """Return the score, the faults and the use of the exemplar of a texture in each way. All textures are periodic.
+
+    Parameters
+    ----------
+    exemplar : Exemplar
+        The exemplar.
+    depth : (H, W) float32
+        Depth of its pixels inside elements, which repeat more visibly than the background.
+    ways : mapping of str to callable
+        Functions that lay a texture and return its source map and its image. Ways that return None are left out.
+
+    """
+    judge = exemplar.cached("judge of ways", lambda: Judge(exemplar))
+    salience = measure_salience(exemplar.guidance, depth)
+    faults: dict[Name, Faults] = {}
+    use: dict[Name, dict[str, float]] = {}
+    for name, lay in ways.items():
+        laid = lay()
+        if laid is None:
+            continue
+        faults[name] = judge.measure(*laid, wrap=True)
+        repetition, coverage = measure_use(salience, exemplar.shape, laid[0])
+        use[name] = {"repetition": round(repetition, 4), "coverage": round(coverage, 4)}
+    scores = compare(faults)
+    return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in faults}
+
+
+def choose(tried: Mapping[Name, Mapping[str, float]]) -> Name:
+    """Return the way with the least score. If several are equally good, return the one that repeats least."""
+    least = min(each["score"] for each in tried.values())
+    equal = [name for name, each in tried.items() if each["score"] <= least + EQUAL]
+    return min(equal, key=lambda name: tried[name]["repetition"])
 
 
 class Judge:

@@ -15,14 +15,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from texrs._typing import Array, Floats, Labels
 from texrs.exemplar.cells import Cells, fill_gaps, take_cells
 from texrs.mosaic.charts import Charts, draw_charts
 from texrs.mosaic.choice import shortlist
 from texrs.mosaic.joining import Joined, join
-from texrs.mosaic.tessellation import Tessellation
+from texrs.mosaic.tessellation import Tessellation, take_periodic_cells
 
-__all__ = ["Mosaic", "complete_cells", "lay_cells"]
+__all__ = ["Mosaic", "complete_cells", "lay_cells", "rearrange_cells"]
 
 
 class Mosaic(NamedTuple):
@@ -32,6 +35,11 @@ class Mosaic(NamedTuple):
     joined: Joined
     places: Floats
     frames: Floats
+
+    @property
+    def label(self) -> NDArray[np.uint32]:
+        """Number of the chart of each pixel, from 1."""
+        return (self.joined.chart + 1).astype(np.uint32)
 
 
 def complete_cells(labels: Labels, image: Array) -> Cells:
@@ -47,3 +55,17 @@ def lay_cells(image: Array, cells: Cells, wanted: Tessellation, *, turns: bool, 
     joined = join(image, cells, charts, wanted.size)
     frames = charts.measure_frames(joined.pixel, joined.chart)
     return Mosaic(charts, joined, charts.places[joined.pixel], frames)
+
+
+def rearrange_cells(labels: Labels, image: Array, size: tuple[int, int], *, turns: bool, seed: int) -> Mosaic:
+    """Lay the labelled cells of an image in a new arrangement of the same kind, on a periodic output.
+
+    Raises
+    ------
+    InvalidInput
+        The image has fewer than three complete cells, or the output is too small for them.
+
+    """
+    cells = complete_cells(labels, image)
+    wanted = take_periodic_cells(cells, size, (True, True), seed=seed)
+    return lay_cells(image, cells, wanted, turns=turns, seed=seed)

@@ -31,7 +31,7 @@ SAMPLES = 640
 """Maximum number of samples along each axis for measuring the areas of Voronoi cells."""
 FILLED, RECTANGLES = 0.85, 0.6
 """Share of its bounding box that a rectangular cell fills, and least share of such cells for a wall of rectangles."""
-REPEATED, SAME = 0.5, 0.2
+REPEATED, SAME = 0.7, 0.2
 """Largest cell of a periodic output, as a share of its size. Distance of the centres of copies, in cell sizes."""
 SLIVER = 0.2
 """Minimum area of a target cell, as a share of the median area. Smaller cells are merged into their neighbours."""
@@ -143,9 +143,9 @@ def take_periodic_cells(cells: Cells, size: tuple[int, int], wrap: tuple[bool, b
         outlines, continued = grow_cells(cells, size, wrap, seed=seed), "quilted"
     extents = np.ptp(outlines, axis=1)
     if (extents.max(axis=0) > REPEATED * np.array(size)).any():
-        raise InvalidInput(f"size: must be at least {1 / REPEATED:g} times as large as the largest cell, got {size}")
+        raise InvalidInput(f"size: must be at least {1 / REPEATED:.2g} times as large as the largest cell, got {size}")
     margin = int(np.ceil(max(MARGIN * cells.size, float(extents.max()) + 2)))
-    # Later outlines cover earlier ones. All copies of a cell are painted together, so that all overlap in one order.
+    # Pixels in several outlines, or in none, are left to the nearest cells.
     shifts = [np.array([r, c]) * size for r in steps(wrap[0]) for c in steps(wrap[1])]
     copies = (outlines[:, np.newaxis] + np.array(shifts)[:, np.newaxis]).reshape(-1, *outlines.shape[1:])
     labels = paint(copies + margin, (size[0] + 2 * margin, size[1] + 2 * margin))

@@ -28,8 +28,8 @@ Departures, with their reasons:
 
 - The border and the seams of the result are measured. If they are visible, other overlaps are tried.
 
-- A result larger than the image is a periodic quilt of patches. A lattice is first stretched slightly so that a whole
-  number of periods fits, as in `texrs.design`.
+- A result larger than the image is laid in one of the ways of `texrs.design`, which are compared at a small size. A
+  lattice is first stretched slightly so that a whole number of periods fits.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling._borders import SEEN
 from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
-from texrs.tiling._enlarging import extend
+from texrs.tiling._enlarging import enlarge
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
@@ -149,6 +149,8 @@ def tile(
         Report:
 
         - ``method``: "tile", or "quilt" if the result is larger than the image.
+        - ``way``: Way that a larger result was laid in, as in `texrs.design`: "still", "lattice", "stitch" or "cells".
+        - ``candidates``: For a larger result, the figures of each way that was tried, or None.
         - ``size``: (rows, columns).
         - ``wrap``: (rows, columns): whether the result repeats along each axis.
         - ``screening``: Weight of the original values in the colour correction.
@@ -264,8 +266,9 @@ def _join_edges(
     reasons: dict[str, str] = {}
     elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
     # A larger result is a quilt of patches. Otherwise join the ends of the image.
+    way, tried = None, None
     if larger:
-        source = extend(exemplar.guidance, size, wrap, watch)
+        source, way, tried = enlarge(exemplar, size, wrap, watch)
     else:
         source, found, reasons = _join_ends(exemplar.guidance, elements, size, choices, wrap, already, refused, watch)
     weight = screening if found or larger else 0.0
@@ -283,6 +286,8 @@ def _join_edges(
     # Measure the finished image, because the colour correction changes the visibility of borders and seams.
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
+        "way": way,
+        "candidates": None if tried is None else {name: dict(figures) for name, figures in tried.items()},
         "size": list(source.shape),
         "wrap": list(wrap),
         "screening": weight,

@@ -1,29 +1,89 @@
-"""Tileable images that are larger than the input."""
+"""Tileable images that are larger than the input.
+
+Several ways are tried at a small size, as in `texrs.design`, and the best one is used. They are large
+patches on a grid, smaller patches where they fit best, and a new arrangement of jointed cells or of stones.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from texrs._typing import Floats, Progress
+from texrs._comparison_of_ways import choose, try_ways
+from texrs._typing import Array, Progress
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar
 from texrs.exemplar.regularity import bend, find_lattice
+from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
+from texrs.mosaic import rearrange_cells
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 from texrs.tiling._whole_elements import find_whole_elements
+
+__all__ = ["Enlarging", "enlarge"]
+
+Enlarging: TypeAlias = Literal["still", "lattice", "stitch", "cells"]
+"""Ways to enlarge an image, as in `texrs.design`."""
 
 PATCH, OVERLAP, DEEP = 0.6, 0.25, 6.0
 """Side of a patch and overlap of two patches, as shares of the shorter side of the image.
 
 The last value is the additional cost of a seam at full depth inside an element, as a multiple of the usual cost.
 """
+LEAST, SHARE = 192, 0.75
+"""Minimum side of a trial in pixels, and its side as a share of the shorter side of the image."""
+TRIED = 32
+"""Minimum side of an image for trials, in pixels."""
 
 
-def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
-    """Return the source map of a periodic quilt of image patches, of any size."""
-    shape = (colours.shape[0], colours.shape[1])
+def enlarge(
+    exemplar: Exemplar, size: tuple[int, int], wrap: Sequence[bool], watch: Progress
+) -> tuple[SourceMap, Enlarging, Mapping[Enlarging, Mapping[str, float]] | None]:
+    """Return the source map of a larger periodic texture, its way, and the figures of all ways that were tried."""
+    lattice = find_lattice(exemplar.guidance)
+    own: Enlarging = "still" if lattice is None else "lattice"
+    if lattice is not None or min(exemplar.shape) < TRIED:
+        return lay(exemplar, own, size, wrap, watch), own, None
+    side = max(LEAST, round(SHARE * min(exemplar.shape)))
+
+    def attempt(way: Enlarging) -> tuple[SourceMap, Array] | None:
+        try:
+            source = lay(exemplar, way, (side, side), (True, True), lambda stage, share: watch("try", 0.0))
+        except InvalidInput:
+            # The cells are too few, or too large for a trial.
+            return None
+        return source, source.render(exemplar.image)
+
+    ways: list[Enlarging] = [own, "stitch"]
+    parts = exemplar.segment()
+    if parts.kind == "components" and parts.layout in ("jointed", "heap"):
+        ways.append("cells")
+    tried = exemplar.cached(
+        "enlarging", lambda: try_ways(exemplar, parts.measure_depth(DEEP), {way: partial(attempt, way) for way in ways})
+    )
+    best = choose(tried)
+    try:
+        return lay(exemplar, best, size, wrap, watch), best, tried
+    except InvalidInput:
+        # The cells do not fit into the size, so the exemplar's own arrangement is kept.
+        return lay(exemplar, own, size, wrap, watch), own, tried
+
+
+def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
+    """Return the source map of a periodic texture of any size in one way."""
+    shape, colours = (exemplar.shape[0], exemplar.shape[1]), exemplar.guidance
+    if way == "stitch":
+        coordinates, patches = stitch_image(exemplar, size, wrap, 0, watch)
+        return SourceMap.from_coordinates(coordinates, shape, label=patches)
+    if way == "cells":
+        turns = (True, True) in exemplar.mirror_symmetries
+        laid = rearrange_cells(exemplar.segment().elements, colours, size, turns=turns, seed=0)
+        return SourceMap.from_coordinates(laid.places, shape, label=laid.label, jacobian=laid.frames)
     elements = find_whole_elements(colours)
     picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * elements.depth, elements.regular)
     return quilt(

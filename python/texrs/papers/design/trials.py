@@ -6,16 +6,16 @@ segmented correctly, are torn if they move. Other ways (`texrs.papers.design.way
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from texrs._comparison_of_ways import Faults, Judge, compare
+from texrs._comparison_of_ways import choose, try_ways
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
-from texrs.metrics import measure_salience, measure_use
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
@@ -29,8 +29,6 @@ from texrs.source_map import SourceMap
 
 __all__ = ["choose_other", "choose_plan", "make_composite"]
 
-EQUAL = 0.02
-"""Difference of scores below which two ways are equally good. The one that repeats less is then used."""
 LEAST, SHARE = 192, 0.75
 """Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
 TILES = 2
@@ -100,26 +98,16 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[Way, list[Tile]] = {}
 
-    def judge_each() -> Mapping[Way, Mapping[str, float]]:
-        judge = exemplar.cached("judge of ways", lambda: Judge(exemplar))
-        salience = measure_salience(exemplar.guidance, plan.parts.measure_depth(DEEP))
-        faults: dict[Way, Faults] = {}
-        use: dict[Way, dict[str, float]] = {}
-        for number, name in enumerate(ways):
-            laid = try_way(replace(plan, way=name), exemplar, arguments, number / len(ways))
-            if laid is None:
-                continue
-            made[name], source, image = laid
-            faults[name] = judge.measure(source, image, wrap=True)
-            repetition, coverage = measure_use(salience, exemplar.shape, source)
-            use[name] = {"repetition": round(repetition, 4), "coverage": round(coverage, 4)}
-        scores = compare(faults)
-        return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in faults}
+    def lay(way: Way) -> tuple[SourceMap, Array] | None:
+        laid = try_way(replace(plan, way=way), exemplar, arguments, ways.index(way) / len(ways))
+        if laid is None:
+            return None
+        made[way], source, image = laid
+        return source, image
 
-    tried = exemplar.cached(key, judge_each)
-    least = min(each["score"] for each in tried.values())
-    equal = [name for name, each in tried.items() if each["score"] <= least + EQUAL]
-    best = min(equal, key=lambda name: tried[name]["repetition"])
+    depth = plan.parts.measure_depth(DEEP)
+    tried = exemplar.cached(key, lambda: try_ways(exemplar, depth, {way: partial(lay, way) for way in ways}))
+    best = choose(tried)
     return replace(plan, way=best, tried=tried, tiles=made.get(best, ()))
 
 

@@ -24,8 +24,7 @@ from texrs.exemplar.regularity import bend
 from texrs.exemplar.symmetry import flip_frame
 from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
-from texrs.mosaic import complete_cells, lay_cells
-from texrs.mosaic.tessellation import take_periodic_cells
+from texrs.mosaic import rearrange_cells
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.course_sheets import lay_sheets, measure_stones
@@ -134,13 +133,10 @@ def stitch_patches(number: int, arguments: Arguments, seed: int, watch: Callable
 
 def lay_new_cells(number: int, plan: Plan, arguments: Arguments, seed: int) -> SourceMap:
     """Lay bent cells of an exemplar in a new arrangement of its cells. The result is always periodic."""
-    cells = complete_cells(plan.parts.elements, plan.guide)
-    wanted = take_periodic_cells(cells, arguments.size, (True, True), seed=seed)
     turns = (True, True) in plan.mirrors
-    laid = lay_cells(plan.guide, cells, wanted, turns=turns, seed=seed)
+    laid = rearrange_cells(plan.parts.elements, plan.guide, arguments.size, turns=turns, seed=seed)
     exemplars = np.full(arguments.size, number, np.uint16)
-    label = (laid.joined.chart + 1).astype(np.uint32)
-    return SourceMap(laid.places, exemplars, label, laid.frames, arguments.shapes)
+    return SourceMap(laid.places, exemplars, laid.label, laid.frames, arguments.shapes)
 
 
 def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:
