@@ -36,7 +36,7 @@ def rate(found: FoundElements, truth: NDArray[np.int32]) -> tuple[float, float]:
         ("dots", 0.9, "separate"),
         ("leaves_and_flowers", 0.86, "separate"),
         ("pebbles", 0.9, "separate heap"),
-        ("scales", 0.9, "heap"),
+        ("scales", 0.9, "heap jointed"),
         ("net", 0.92, "net"),
         ("bricks", 0.85, "jointed"),
         ("weave", 0.7, "jointed"),

@@ -57,6 +57,10 @@ OTHERS = 48
 """Number of elements that each candidate is compared with."""
 ROUNDS = 4
 """Largest number of rounds of the consensus."""
+CROSS = ndimage.generate_binary_structure(2, 1)
+"""Neighbourhood that elements grow into by one pixel. Without it, the mean F of 141 images is 0.05 lower, the IoU 0.02."""
+STRANGE = -1.0
+"""Log-likelihood of a code word below which elements do not grow into its pixels. -1.5 to -0.5 gave the same F and IoU."""
 FEWEST = 3, 1
 """Least number of elements of a choice. The second value is used if an image has no choice with the first one."""
 
@@ -153,7 +157,7 @@ def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None
     picked = np.flatnonzero(chosen)
     elements = candidates.pick(picked)
     value = measure_value(candidates, quality, chosen)
-    return Choice(elements.paint(leaves), elements, quality[picked], value, score, lines, level, strength)
+    return Choice(grow(elements, leaves, contours), elements, quality[picked], value, score, lines, level, strength)
 
 
 def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
@@ -168,6 +172,20 @@ def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
     strength = strength / (0.35 + 0.65 * around / max(float(around.mean()), 1e-6))
     level = max(float(np.quantile(strength, 0.85)), 0.7 * float(np.quantile(strength, 0.97))) + 0.03
     return np.asarray(strength, np.float32), level
+
+
+def grow(elements: Candidates, leaves: Leaves, contours: Contours) -> NDArray[np.int32]:
+    """Return the labels of elements that are one pixel larger.
+
+    Outlines on the crests of lines are inside the true outlines. Pixels that look like the background are left out.
+    """
+    labels = elements.paint(leaves)
+    everything, inside = leaves.values[:, 7:].sum(0), elements.words.sum(0)
+    few = 0.002 * labels.size
+    inside, outside = inside + few, everything - inside + few
+    likely = np.log(inside / inside.sum()) - np.log(outside / outside.sum()) > STRANGE
+    larger = ndimage.maximum_filter(labels, footprint=CROSS)
+    return np.where((labels == 0) & likely[contours.words], larger, labels)
 
 
 def choose_sizes(
