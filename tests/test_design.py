@@ -218,9 +218,9 @@ def test_who_forbids_turning_forbids_mirrors_unless_asked_for(options, expected)
 
 def test_a_suspected_light_is_enough_not_to_mirror(monkeypatch):
     noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
-    for sure, count in ((4.4, 4), (4.6, 2), (5.1, 2)):
-        monkeypatch.setattr(symmetry, "measure_polarity", lambda guide, sure=sure: (sure, 0.0, 0.0))
-        assert len(texrs.Exemplar(noise + np.float32(sure)).mirror_symmetries) == count
+    for found, count in (((2.4, 0.0, 0.0), 4), ((2.6, 0.0, 0.0), 2), ((2.6, 2.6, 9.0), 1), ((0.0, 0.0, 9.0), 2)):
+        monkeypatch.setattr(symmetry, "measure_polarity", lambda guide, found=found: found)
+        assert len(texrs.Exemplar(noise + np.float32(sum(found))).mirror_symmetries) == count
 
 
 def test_elements_at_the_border_slide_along_it():

@@ -43,7 +43,7 @@ from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.separate_elements import Instances, as_instances, find_instances
 from texrs.exemplar.stitching import guess_instances, make_stitcher
-from texrs.exemplar.symmetry import SUSPECT, Flip, find_mirrors
+from texrs.exemplar.symmetry import Flip, find_mirrors
 from texrs.io import _origins
 
 if TYPE_CHECKING:
@@ -300,7 +300,7 @@ class Exemplar:
 
         The first pair is the example itself.
         """
-        return self.cached("mirror_symmetries", lambda: find_mirrors(self.guidance, SUSPECT))
+        return self.cached("mirror_symmetries", lambda: find_mirrors(self.guidance))
 
     @property
     def anisotropy(self) -> float:

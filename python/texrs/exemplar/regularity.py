@@ -62,8 +62,8 @@ LEANS = 3.0
 
 A wall photographed slightly obliquely has up to 10.
 """
-FINE, BLOCKS = (0.7, 1.5), 4
-"""Standard deviations of two Gaussians, in pixels, for comparing an image with its mirror images.
+SCALES, BLOCKS = (0.7, 1.5, 4.0), 4
+"""Standard deviations of three Gaussians, in pixels, for comparing an image with its mirror images.
 
 The second value is the number of parts per side for estimating the standard error.
 """
@@ -366,7 +366,7 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
     along = [0.0, 0.0, 0.0]
     if min(light.shape) < BLOCKS * SHORTEST:
         return along[0], along[1], along[2]
-    for sigma in FINE:
+    for sigma in SCALES:
         rows, columns = (gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1)))
         squares = rows * rows, columns * columns
         energy = squares[0] + squares[1]

@@ -15,7 +15,7 @@ from texrs._arrays import as_image, guidance, log_single
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.patches import choose_usual_side, mark_corners
-from texrs.exemplar.symmetry import ALL, NONE, SUSPECT, Flip, find_mirrors
+from texrs.exemplar.symmetry import ALL, NONE, Flip, find_mirrors
 from texrs.inpainting._judge import Filled, judge_seams
 from texrs.inpainting._scene import Scene
 from texrs.source_map import SourceMap
@@ -120,13 +120,13 @@ def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None)
     if mirror is not None:
         return ALL if mirror else (NONE,)
     if len(pictures) == 2:
-        return find_mirrors(guidance(as_image(pictures[1])), SUSPECT)
+        return find_mirrors(guidance(as_image(pictures[1])))
     rows, columns = (np.flatnonzero(open_.any(axis=1 - axis)) for axis in range(2))
     whole = pictures[0]
     beside = [whole[: rows[0]], whole[rows[-1] + 1 :], whole[:, : columns[0]], whole[:, columns[-1] + 1 :]]
     # Use the largest strip next to the holes, because the outline of a hole would look like directional light.
     known = max(beside, key=lambda part: part.shape[0] * part.shape[1])
-    return find_mirrors(guidance(as_image(known)), SUSPECT) if known.size else ALL
+    return find_mirrors(guidance(as_image(known))) if known.size else ALL
 
 
 def try_sides(
