@@ -6,7 +6,7 @@ the joints between courses cross the whole image. They are straight and thin, an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,10 @@ class Courses:
     def heights(self) -> NDArray[np.float64]:
         """Heights of the courses, in pixels."""
         return np.diff(self.joints)
+
+    def scale(self, factor: float) -> Courses:
+        """Return the courses of the image in another size, whose sides are multiplied by `factor`."""
+        return replace(self, joints=tuple(factor * (joint + 0.5) - 0.5 for joint in self.joints))
 
     def level(self, shape: tuple[int, ...]) -> SourceMap:
         """Return the source map that levels the courses of an exemplar by a rotation."""

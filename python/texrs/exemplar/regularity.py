@@ -185,6 +185,13 @@ class Lattice:
         return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
 
+def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
+    """Return the lattice of an image whose sides are multiplied by a factor."""
+    exact = (factor * lattice.vectors.T).tolist()
+    a, b = ((round(row), round(column)) for row, column in exact)
+    return Lattice(a, b, lattice.correlation, (tuple(exact[0]), tuple(exact[1])))
+
+
 def find_lattice(guide: Floats) -> Lattice | None:
     """Find the lattice of an image, by autocorrelation of its lightness or edges."""
     from scipy.ndimage import gaussian_filter

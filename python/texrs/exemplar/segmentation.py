@@ -23,7 +23,7 @@ from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.courses import Courses, find_courses
 from texrs.exemplar.layers import Regions
-from texrs.exemplar.regularity import Lattice, find_lattice
+from texrs.exemplar.regularity import Lattice, find_lattice, scale_lattice
 from texrs.exemplar.shapes import mark_outlines
 
 if TYPE_CHECKING:
@@ -296,6 +296,26 @@ def segment(
         reasons.insert(0, fault)
     cells = draw_cells(height, width)
     return Segmentation((cells > 0).astype(np.int32), cells, "grid", "; ".join(reasons), lattice, courses)
+
+
+def shrink(parts: Segmentation, times: int) -> Segmentation:
+    """Return the segmentation of an image whose sides are shorter by a whole factor.
+
+    The label of a square block is that of its middle pixel, so small elements can vanish.
+    """
+    rows, columns = (n // times for n in parts.elements.shape)
+    layers, elements = (
+        each[times // 2 :: times, times // 2 :: times][:rows, :columns] for each in (parts.layers, parts.elements)
+    )
+    _, numbers = np.unique(elements, return_inverse=True)
+    first = 0 if (elements == 0).any() else 1
+    return replace(
+        parts,
+        layers=np.ascontiguousarray(layers),
+        elements=np.asarray(numbers.reshape(rows, columns) + first, np.int32),
+        lattice=None if parts.lattice is None else scale_lattice(parts.lattice, 1 / times),
+        courses=None if parts.courses is None else parts.courses.scale(1 / times),
+    ).freeze()
 
 
 def find_fault(found: FoundElements) -> str:

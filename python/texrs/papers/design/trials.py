@@ -16,12 +16,13 @@ from texrs._comparison_of_ways import choose, try_ways
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
+from texrs.exemplar.segmentation import shrink
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
-from texrs.papers.design.plan import Plan, Way
+from texrs.papers.design.plan import Plan, Way, make_plan
 from texrs.papers.design.texture import correct_colours, look_up, say_finish, stitch_tiles
 from texrs.papers.design.tiles import fill_holes
 from texrs.papers.design.ways import DEEP, find_obstacle, list_ways
@@ -31,6 +32,11 @@ __all__ = ["choose_other", "choose_plan", "make_composite"]
 
 LEAST, SHARE = 192, 0.75
 """Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
+SMALL = 256
+"""Shorter side of the exemplar in trials, in pixels. Larger exemplars are reduced to between one and two of it.
+
+Faults were compared with the eye at this size. Trials at the full size take longer than the texture itself.
+"""
 TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
 VARIED: tuple[Way, ...] = ("move", "sow")
@@ -98,17 +104,36 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[Way, list[Tile]] = {}
 
-    def lay(way: Way) -> tuple[SourceMap, Array] | None:
-        laid = try_way(replace(plan, way=way), exemplar, arguments, ways.index(way) / len(ways))
-        if laid is None:
-            return None
-        made[way], source, image = laid
-        return source, image
+    def judge_each() -> dict[Way, dict[str, float]]:
+        times = 1 if exemplar.labels else max(1, min(exemplar.shape) // SMALL)
+        small, model = (exemplar, plan) if times == 1 else reduce(exemplar, plan, arguments, times)
 
-    depth = plan.parts.measure_depth(DEEP)
-    tried = exemplar.cached(key, lambda: try_ways(exemplar, depth, {way: partial(lay, way) for way in ways}))
+        def lay(way: Way) -> tuple[SourceMap, Array] | None:
+            laid = try_way(replace(model, way=way), small, arguments, ways.index(way) / len(ways))
+            if laid is None:
+                return None
+            tiles, source, image = laid
+            if model is plan:
+                made[way] = tiles
+            return source, image
+
+        return try_ways(small, model.parts.measure_depth(DEEP), {way: partial(lay, way) for way in ways})
+
+    tried = exemplar.cached(key, judge_each)
     best = choose(tried)
     return replace(plan, way=best, tried=tried, tiles=made.get(best, ()))
+
+
+def reduce(exemplar: Exemplar, plan: Plan, arguments: Arguments, times: int) -> tuple[Exemplar, Plan]:
+    """Return an exemplar whose pixels are means of square blocks, and its plan."""
+    rows, columns = (n // times for n in exemplar.shape)
+    colours = exemplar.guidance[: rows * times, : columns * times].reshape(rows, times, columns, times, -1)
+    small = Exemplar(np.ascontiguousarray(colours.mean(axis=(1, 3), dtype=np.float64).astype(np.float32)), labels=False)
+    side = None if arguments.side is None else max(4, arguments.side // times)
+    parts = shrink(plan.parts, times)
+    # The stitcher uses these elements too, so do not find them again.
+    small.cached(("segmentation", ElementOptions().key), lambda: parts)
+    return small, make_plan(small, parts, arguments.deformation, side=side)
 
 
 def choose_other(plan: Plan) -> Plan:
@@ -126,9 +151,13 @@ def try_way(
 
     None if a new arrangement of its cells or elements is impossible, or bends the cells too much.
     """
+    if find_obstacle(plan, plan.way):
+        # The elements of a reduced exemplar can be too small.
+        return None
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
+        side=plan.side,
         exemplars=[exemplar],
         guides=[exemplar],
         size=(side, side),

@@ -44,6 +44,8 @@ CLOSE = 0.5
 """Share of the exemplar's area above which its elements count as close to each other."""
 FEWEST = 6
 """Minimum number of whole elements for a new arrangement."""
+SMALLEST = 12
+"""Minimum size of cells that are bent, in pixels. The joints of smaller cells are not wide enough for cuts."""
 
 
 def list_ways(plan: Plan) -> list[Way]:
@@ -74,8 +76,10 @@ def find_obstacle(plan: Plan, way: Way) -> str:
         return "neither jointed cells nor a heap of elements were found in the exemplar"
     if way == "sow" and not (found and plan.pure and classify(parts) == "apart"):
         return "no separate elements on a background were found in the exemplar"
-    if way in ("cells", "sow") and len(list_whole(plan)) < FEWEST:
+    if way in ("cells", "sow") and len(whole := list_whole(plan)) < FEWEST:
         return f"fewer than {FEWEST} whole elements were found in the exemplar"
+    if way == "cells" and np.median([e.area for e in whole]) < SMALLEST**2:
+        return f"the cells in the exemplar are smaller than {SMALLEST} pixels"
     return ""
 
 
