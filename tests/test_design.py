@@ -48,7 +48,13 @@ def test_size_dtype_and_content(pebbles, result):
 
 
 def test_stages_are_pictures_in_order(result):
-    assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "before_blending"]
+    assert [s for s in result.stages if s != "ways"] == [
+        "segmentation",
+        "deformed",
+        "holes",
+        "completed",
+        "before_blending",
+    ]
     assert result.stages["holes"].dtype == bool
     # A separate element leaves a hole where it was.
     apart = texrs.design(samples.dots((96, 96)).image, 96, copies=1, way="move").stages

@@ -29,6 +29,11 @@ def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     for plan in ("move", "still", "stitch"):
         assert chosen[plan].report["way"] == [plan]
         assert chosen[plan].report["candidates"] == [None]
+    shown, height = chosen["auto"].stages["ways"], 192
+    assert shown.shape == (height, height * len(tried), 3)
+    [refused] = chosen["auto"].report["refused"]
+    assert not set(refused) & {"move", "still", "stitch"}
+    assert refused["sow"] == "no separate elements on a background were found in the exemplar"
     np.testing.assert_array_equal(chosen["auto"].image, chosen[best].image)
     assert (chosen["move"].image != chosen["still"].image).any()
     assert (chosen["stitch"].image != chosen["still"].image).any()

@@ -189,6 +189,8 @@ def design(
         Stages:
 
         - ``segmentation``: The first example, with each element in a different colour.
+        - ``ways``: The trial textures of the first example side by side, in the order of the report's "candidates". Only
+          if ways were tried.
         - ``deformed``: The moved elements of the first copy.
         - ``holes``: Pixels of this copy that neither elements nor background cover.
         - ``completed``: This copy after its holes are filled.
@@ -207,6 +209,7 @@ def design(
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``way``: Way that each example was laid in.
+        - ``refused``: For each example, the ways that it does not allow, with the reason as one sentence.
         - ``candidates``: For each example, the figures of each way that was tried, or None without a trial. 0 is
           best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and coarse lines
           that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine and coarse

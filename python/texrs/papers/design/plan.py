@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from texrs._typing import Bools, Floats
+from texrs._typing import Array, Bools, Floats
 from texrs.exemplar import Exemplar
 from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners
 from texrs.exemplar.segmentation import Segmentation
@@ -50,6 +50,8 @@ class Plan:
     """Way to lay the texture (`texrs.papers.design.ways`)."""
     tried: Mapping[Way, Mapping[str, float]] | None = None
     """Score and faults of each way that was tried, or None."""
+    trials: Array | None = None
+    """Trial textures of these ways side by side, or None."""
     tiles: Sequence[Tile] = ()
     """Tiles that the trial has just computed. A texture with the trial's seed uses them again."""
 

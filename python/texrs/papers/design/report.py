@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from texrs._typing import Array
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import classify
-from texrs.papers.design.plan import Plan
+from texrs.papers.design.plan import Plan, Way
+from texrs.papers.design.ways import find_obstacle
 from texrs.source_map import SourceMap
 from texrs.volume import label_to_color
 
@@ -23,7 +24,8 @@ __all__ = ["describe", "draw_stages"]
 
 def draw_stages(plan: Plan, tile: Tile, picture: Array) -> dict[str, Array]:
     """Return images of the stages, in their order."""
-    return {"segmentation": draw_elements(plan), **tile.stages, "before_blending": picture}
+    tried = {} if plan.trials is None else {"ways": plan.trials}
+    return {"segmentation": draw_elements(plan), **tried, **tile.stages, "before_blending": picture}
 
 
 TINT = 0.55
@@ -61,6 +63,7 @@ def describe(
         "reason": first.parts.reason,
         "arrangement": ["courses" if p.way == "courses" else classify(p.parts) for p in plans],
         "way": [p.way for p in plans],
+        "refused": [describe_obstacles(p) for p in plans],
         "candidates": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
         "lattice_stretch": [describe_closing(p, arguments) for p in plans],
@@ -72,6 +75,12 @@ def describe(
         "seams": seams,
         "operations": [t.log for t in tiles],
     }
+
+
+def describe_obstacles(plan: Plan) -> dict[str, str]:
+    """Return the reason for each way that an exemplar does not allow."""
+    reasons = {way: find_obstacle(plan, way) for way in get_args(Way)}
+    return {way: reason for way, reason in reasons.items() if reason}
 
 
 def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | None:

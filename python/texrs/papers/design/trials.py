@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from texrs._arrays import as_image, as_rgb, to_unit
 from texrs._comparison_of_ways import choose, try_ways
 from texrs._typing import Array
 from texrs.errors import InvalidInput
@@ -104,7 +105,8 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[Way, list[Tile]] = {}
 
-    def judge_each() -> dict[Way, dict[str, float]]:
+    def judge_each() -> tuple[dict[Way, dict[str, float]], Array]:
+        shown = []
         times = 1 if exemplar.labels else max(1, min(exemplar.shape) // SMALL)
         small, model = (exemplar, plan) if times == 1 else reduce(exemplar, plan, arguments, times)
 
@@ -115,13 +117,15 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
             tiles, source, image = laid
             if model is plan:
                 made[way] = tiles
+            shown.append(np.rint(255 * as_rgb(to_unit(as_image(image)))).astype(np.uint8))
             return source, image
 
-        return try_ways(small, model.parts.measure_depth(DEEP), {way: partial(lay, way) for way in ways})
+        tried = try_ways(small, model.parts.measure_depth(DEEP), {way: partial(lay, way) for way in ways})
+        return tried, np.concatenate(shown, axis=1)
 
-    tried = exemplar.cached(key, judge_each)
+    tried, trials = exemplar.cached(key, judge_each)
     best = choose(tried)
-    return replace(plan, way=best, tried=tried, tiles=made.get(best, ()))
+    return replace(plan, way=best, tried=tried, trials=trials, tiles=made.get(best, ()))
 
 
 def reduce(exemplar: Exemplar, plan: Plan, arguments: Arguments, times: int) -> tuple[Exemplar, Plan]:
