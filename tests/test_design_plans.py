@@ -29,7 +29,7 @@ def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     for plan in ("move", "still", "stitch"):
         assert chosen[plan].report["way"] == [plan]
         assert chosen[plan].report["candidates"] == [None]
-    shown, height = chosen["auto"].stages["ways"], 192
+    shown, height = chosen["auto"].stages["ways"], 224
     assert shown.shape == (height, height * len(tried), 3)
     [refused] = chosen["auto"].report["refused"]
     assert not set(refused) & {"move", "still", "stitch"}

@@ -31,12 +31,11 @@ from texrs.source_map import SourceMap
 
 __all__ = ["choose_other", "choose_plan", "make_composite"]
 
-LEAST, SHARE = 192, 0.75
-"""Minimum side of a trial texture in pixels, and its side as a share of the exemplar's shorter side."""
-SMALL = 256
-"""Shorter side of the exemplar in trials, in pixels. Larger exemplars are reduced to between one and two of it.
+SIDE = 224
+"""Side of a trial texture, and about the shorter side of the exemplar that it is laid from, in pixels.
 
-Faults were compared with the eye at this size. Trials at the full size take longer than the texture itself.
+Larger exemplars are reduced. Faults were compared with the eye at about this size, and trials at the full size take
+longer than the texture itself.
 """
 TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
@@ -44,10 +43,10 @@ VARIED: tuple[Way, ...] = ("move", "sow")
 """Ways whose tiles all differ. The tiles of the other ways are mirror images of the exemplar."""
 NEW: tuple[Way, ...] = ("cells", "sow")
 """Ways with a new arrangement, which need a texture of some size."""
-BENT = 0.42
-"""Bending of cells above which a new arrangement of them is not used (90th percentile). Rectangles look rounded.
+BENT = 0.6
+"""Bending of cells above which a new arrangement of them is not used (90th percentile). Stones look melted.
 
-Chosen by eye on half of 51 pictures.
+Chosen by eye on 22 pictures with jointed cells or heaps: those above it looked worse than all other ways.
 """
 TRIAL = 0
 """Seed of all trials. Their copies are used again by the texture with this seed."""
@@ -107,7 +106,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
 
     def judge_each() -> tuple[dict[Way, dict[str, float]], Array]:
         shown = []
-        times = 1 if exemplar.labels else max(1, min(exemplar.shape) // SMALL)
+        times = 1 if exemplar.labels else max(1, round(min(exemplar.shape) / SIDE))
         small, model = (exemplar, plan) if times == 1 else reduce(exemplar, plan, arguments, times)
 
         def lay(way: Way) -> tuple[SourceMap, Array] | None:
@@ -158,13 +157,12 @@ def try_way(
     if find_obstacle(plan, plan.way):
         # The elements of a reduced exemplar can be too small.
         return None
-    side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
         side=plan.side,
         exemplars=[exemplar],
         guides=[exemplar],
-        size=(side, side),
+        size=(SIDE, SIDE),
         wrap=(True, True),
         shares=np.ones(1),
         density=None,
