@@ -16,7 +16,8 @@ def gravel():
 
 @pytest.fixture(scope="module")
 def chosen(gravel):
-    return {plan: texrs.design(gravel, 160, seed=5, way=plan) for plan in ("auto", "move", "still", "stitch")}
+    ways = ("auto", "move", "still", "stitch", "cells")
+    return {plan: texrs.design(gravel, 160, seed=5, way=plan) for plan in ways}
 
 
 def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
@@ -26,7 +27,7 @@ def test_the_better_plan_is_taken_and_the_report_says_why(chosen):
     assert ways <= set(tried) <= ways | {"cells"}
     [best] = chosen["auto"].report["way"]
     assert tried[best]["score"] <= min(each["score"] for each in tried.values()) + EQUAL
-    for plan in ("move", "still", "stitch"):
+    for plan in ("move", "still", "stitch", "cells"):
         assert chosen[plan].report["way"] == [plan]
         assert chosen[plan].report["candidates"] == [None]
     shown, height = chosen["auto"].stages["ways"], 224
