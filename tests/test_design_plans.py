@@ -5,7 +5,7 @@ import pytest
 
 import texrs
 from texrs import SourceMap, samples
-from texrs._comparison_of_ways import EQUAL, Judge, compare
+from texrs._comparison_of_ways import EQUAL, Judge, choose, compare
 from texrs.errors import InvalidInput
 
 
@@ -127,3 +127,13 @@ def test_each_exemplar_of_several_has_a_plan(gravel):
 def test_plans_are_checked(gravel):
     with pytest.raises(InvalidInput, match="^way"):
         texrs.design(gravel, 64, way="fly")
+
+
+def test_mirrored_copies_must_give_a_better_texture():
+    tried = {
+        "still": {"score": 0.5, "repetition": 0.1},
+        "stitch": {"score": 0.5 + 0.9 * EQUAL, "repetition": 0.3},
+    }
+    assert choose(tried) == "still"
+    assert choose(tried, ["still"]) == "stitch"
+    assert choose(tried | {"stitch": {"score": 0.5 + 1.1 * EQUAL, "repetition": 0.3}}, ["still"]) == "still"

@@ -18,7 +18,7 @@ Repetition is not a figure, because it does not agree with the eye.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import TypeVar
@@ -122,11 +122,15 @@ def try_ways(
     return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in faults}
 
 
-def choose(tried: Mapping[Name, Mapping[str, float]]) -> Name:
-    """Return the way with the least score. If several are equally good, return the one that repeats least."""
+def choose(tried: Mapping[Name, Mapping[str, float]], mirrored: Collection[Name] = ()) -> Name:
+    """Return the way with the least score.
+
+    If several ways are equally good, return one without mirrored copies, and of these the one that repeats least.
+    Mirrored copies can invert the light.
+    """
     least = min(each["score"] for each in tried.values())
     equal = [name for name, each in tried.items() if each["score"] <= least + EQUAL]
-    return min(equal, key=lambda name: tried[name]["repetition"])
+    return min(equal, key=lambda name: (name in mirrored, tried[name]["repetition"]))
 
 
 class Judge:

@@ -41,6 +41,8 @@ TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
 VARIED: tuple[Way, ...] = ("move", "sow")
 """Ways whose tiles all differ. The tiles of the other ways are mirror images of the exemplar."""
+MIRRORED: tuple[Way, ...] = ("move", "still", "lattice", "courses")
+"""Ways that use mirror images of the exemplar if they are permitted."""
 NEW: tuple[Way, ...] = ("cells", "sow")
 """Ways with a new arrangement, which need a texture of some size."""
 BENT = 0.6
@@ -123,7 +125,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         return tried, np.concatenate(shown, axis=1)
 
     tried, trials = exemplar.cached(key, judge_each)
-    best = choose(tried)
+    best = choose(tried, MIRRORED if len(plan.mirrors) > 1 else ())
     return replace(plan, way=best, tried=tried, trials=trials, tiles=made.get(best, ()))
 
 
