@@ -11,7 +11,7 @@ from scipy import ndimage
 from texrs._arrays import as_image, as_rgb, as_seed, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._progress import answering, ask, listen
-from texrs._typing import Array, Bools, Floats, Labels, Progress
+from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._layout_class import LAYOUTS, Arrangement, read_layout
 from texrs.exemplar.element_finder._outline_cuts import enlarge, refine_outlines
@@ -109,13 +109,13 @@ class FoundElements:
 
 
 _FOUND: Cache[bytes, FoundElements] = Cache(1 << 26, lambda found: found.labels.nbytes)
-"""Recent results, by the content of the image and the seed."""
+"""Recent results, by the colours of the image and the seed."""
 
 
 def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | None = None) -> FoundElements:
     """Find the elements that an image repeats, and their layout.
 
-    Recent results are cached by the content of the image.
+    Recent results are cached by the colours of the image.
 
     Parameters
     ----------
@@ -148,15 +148,17 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     """
     pixels, seed, progress = as_image(image, "image"), as_seed(seed), listen(progress)
     watch = progress or (lambda stage, share: ask())
-    key = content_hash(pixels, seed)
-    found = _FOUND.get_or_make(key, lambda: analyse(pixels, seed, lambda share: watch("elements", share)))
+    # The key contains the colours, so that an image and its colours in [0, 1] share one result.
+    rgb = as_rgb(to_unit(pixels))
+    found = _FOUND.get_or_make(
+        content_hash(rgb, seed), lambda: analyse(rgb, seed, lambda share: watch("elements", share))
+    )
     watch("elements", 1.0)
     return found
 
 
-def analyse(pixels: Array, seed: int, watch: Callable[[float], object]) -> FoundElements:
-    """Find the elements of an image. `watch` is called with the finished share of the work."""
-    rgb = as_rgb(to_unit(pixels))
+def analyse(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundElements:
+    """Find the elements of an image (H, W, 3) in [0, 1]. `watch` is called with the finished share of the work."""
     small = reduce(rgb)
     if min(small.shape[:2]) < LEAST or float(np.ptp(small)) == 0:
         return report_nothing(rgb.shape[0], rgb.shape[1])
