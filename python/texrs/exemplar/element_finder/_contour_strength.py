@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from texrs import _rust
 from texrs._arrays import to_lab
+from texrs._engine.smoothing import smooth
 from texrs._typing import Floats
 
 Words = NDArray[np.uint8]
@@ -81,6 +82,8 @@ def make_words(lab: Floats, seed: int) -> tuple[Words, int]:
 
 def blur(values: Floats, sigma: float, order: tuple[int, int] = (0, 0)) -> Floats:
     """Return values smoothed by a Gaussian of three standard deviations' reach, or derivatives of them."""
+    if order == (0, 0):
+        return smooth(values, sigma, truncate=3.0)
     return np.asarray(ndimage.gaussian_filter(values, sigma, order, truncate=3.0))
 
 
