@@ -64,17 +64,18 @@ pub fn choose(
             if chosen[i as usize] {
                 continue;
             }
+            // Chosen sets are worth more than 0, so stop as soon as some of them are worth as much as this set.
             rivals.clear();
-            rivals.extend(
-                sets.get(i as usize)
-                    .iter()
-                    .map(|&leaf| owner[leaf as usize])
-                    .filter(|&o| o != NONE),
-            );
-            rivals.sort_unstable();
-            rivals.dedup();
-            let rival: f64 = rivals.iter().map(|&r| worth[r as usize]).sum();
-            if worth[i as usize] > rival + 1e-9 {
+            let mut rival = 0.0;
+            let better = sets.get(i as usize).iter().all(|&leaf| {
+                let other = owner[leaf as usize];
+                if other != NONE && !rivals.contains(&other) {
+                    rivals.push(other);
+                    rival += worth[other as usize];
+                }
+                worth[i as usize] > rival + 1e-9
+            });
+            if better {
                 for &r in &rivals {
                     chosen[r as usize] = false;
                     for &leaf in sets.get(r as usize) {

@@ -150,11 +150,14 @@ impl Band {
                 alien.push(l != label && l != 0);
             }
         }
-        let (inner, outer) = (distance(&own, shape, false), distance(&own, shape, true));
-        let depth: Vec<f32> = inner.iter().zip(&outer).map(|(i, o)| i - o).collect();
+        let depth = signed(&own, distance(&own, shape));
         // Pixels of other regions that are deeper than half of the band stay in these regions.
-        let inside = distance(&alien, shape, false);
-        let other = inside.iter().map(|&d| d > 0.5 * f32::from(reach)).collect();
+        let other = if alien.contains(&true) {
+            let inside = signed(&alien, distance(&alien, shape));
+            inside.iter().map(|&d| d > 0.5 * f32::from(reach)).collect()
+        } else {
+            alien
+        };
         Self {
             origin,
             shape,
@@ -282,21 +285,24 @@ fn parts(
     (part, sizes)
 }
 
-/// Returns the chamfer distance of each pixel from the nearest pixel whose flag is `to`, with steps of 1 and 4/3. It
-/// is 0 at those pixels and 0.5 at their neighbours.
-fn distance(flags: &[bool], [rows, columns]: [usize; 2], to: bool) -> Vec<f32> {
+/// Returns distances with a negative sign where a flag is false.
+fn signed(flags: &[bool], mut distance: Vec<f32>) -> Vec<f32> {
+    for (value, &flag) in distance.iter_mut().zip(flags) {
+        *value = if flag { *value } else { -*value };
+    }
+    distance
+}
+
+/// Returns the chamfer distance of each pixel from the nearest pixel with another flag, with steps of 1 and 4/3. It is
+/// 0.5 next to such a pixel, because the outline is half a pixel from the pixels on both sides.
+fn distance(flags: &[bool], [rows, columns]: [usize; 2]) -> Vec<f32> {
     const DIAGONAL: f32 = 4.0 / 3.0;
-    let far = (rows + columns) as f32;
-    let mut out: Vec<f32> = flags
-        .iter()
-        .map(|&f| if f == to { 0.0 } else { far })
-        .collect();
+    let mut out = vec![(rows + columns) as f32; flags.len()];
     let relax = |out: &mut [f32], p: usize, q: usize, step: f32| {
-        // The outline is half a pixel from the pixels on both sides.
-        let value = if out[q] == 0.0 {
-            step - 0.5
-        } else {
+        let value = if flags[p] == flags[q] {
             out[q] + step
+        } else {
+            step - 0.5
         };
         out[p] = out[p].min(value);
     };
