@@ -15,7 +15,6 @@ from texrs.cli._readers import read_field
 from texrs.cli._texts import About
 
 Capture = pytest.CaptureFixture[str]
-WALL = samples.tilted_bricks((120, 160))
 CORNERS = [[20, 20], [24, 104], [100, 110], [112, 14]]
 """(row, column) of a rectangle of the wall."""
 
@@ -23,7 +22,7 @@ CORNERS = [[20, 20], [24, 104], [100, 110], [112, 14]]
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    io.write("wall.png", WALL.image)
+    io.write("wall.png", samples.tilted_bricks((120, 160)).image)
     return tmp_path
 
 
@@ -42,7 +41,7 @@ def test_no_command_asks_for_rows_first() -> None:
 def test_corners_are_x_and_y(here: Path) -> None:
     words = " ".join(f"{column},{row}" for row, column in CORNERS)
     assert main(["rectify", "wall.png", "-o", "flat.png", "--corners", words, "-q"]) == 0
-    expected = texrs.rectify(WALL.image, view=texrs.PlaneView(corners=CORNERS)).image
+    expected = texrs.rectify(samples.tilted_bricks((120, 160)).image, view=texrs.PlaneView(corners=CORNERS)).image
     np.testing.assert_array_equal(io.read("flat.png"), expected)
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import texrs
 from plane_checks import look_at_room
-from texrs import PlaneView, RenderOptions, SourceMap, Synthesis, samples
+from texrs import Plane, PlaneView, RenderOptions, SourceMap, Synthesis, samples
 from texrs.errors import FileError, InvalidInput
 
 PEBBLES = samples.pebbles((64, 80)).image
@@ -18,9 +19,20 @@ HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
 FLOOR = samples.load("tilted_discs", size=(96, 112)).image
 WORDS = json.loads(RenderOptions((True, True)).arrays()["finish"].tobytes())
-ROOM, LOW, LOWER, UPPER = look_at_room((96, 112))
 
-VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
+
+@cache
+def room() -> tuple[np.ndarray, np.ndarray, Plane, Plane]:
+    return look_at_room((96, 112))
+
+
+def remove_from_room() -> Synthesis:
+    picture, low, lower, upper = room()
+    views = [PlaneView(plane=lower, ground=low), PlaneView(plane=upper, ground=~low)]
+    return texrs.remove(picture, np.pad(HOLE, ((16, 16), (16, 16))), view=views)
+
+
+VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray | None]] = {
     "design": (lambda: texrs.design(PEBBLES, (72, 64)), PEBBLES),
     "design without blending": (lambda: texrs.design(PEBBLES, 64, screening=None), PEBBLES),
     "design as printed": (lambda: texrs.design(PEBBLES, 64, method="paper"), PEBBLES),
@@ -39,14 +51,7 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
         lambda: texrs.remove(FLOOR, np.pad(HOLE, ((0, 32), (0, 32))), view=texrs.PlaneView(slant=34, fov=60)),
         FLOOR,
     ),
-    "remove from a room": (
-        lambda: texrs.remove(
-            ROOM,
-            np.pad(HOLE, ((16, 16), (16, 16))),
-            view=[PlaneView(plane=LOWER, ground=LOW), PlaneView(plane=UPPER, ground=~LOW)],
-        ),
-        ROOM,
-    ),
+    "remove from a room": (remove_from_room, None),
     "self-splice": (
         lambda: texrs.self_splice(samples.dots((64, 64)).image, "regularise"),
         samples.dots((64, 64)).image,
@@ -57,7 +62,7 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
 @pytest.fixture(scope="module", params=VERBS)
 def made(request: pytest.FixtureRequest) -> tuple[Synthesis, np.ndarray]:
     make, image = VERBS[request.param]
-    return make(), image
+    return make(), room()[0] if image is None else image
 
 
 def test_applying_a_map_does_what_the_verb_did(made: tuple[Synthesis, np.ndarray]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,11 @@ from texrs.cli import main
 from texrs.errors import InvalidInput
 
 PLANE = Plane((240, 288), 45, 90, fov=55)
-FLOOR = look("dots", PLANE)
+
+
+@cache
+def look_at_floor() -> np.ndarray:
+    return look("dots", PLANE)
 
 
 def test_a_flat_texture_is_as_it_was() -> None:
@@ -32,10 +37,10 @@ def test_a_flat_texture_is_as_it_was() -> None:
 
 
 def test_scales_are_even() -> None:
-    result = texrs.rectify(FLOOR, view=PlaneView(slant=45, fov=55))
+    result = texrs.rectify(look_at_floor(), view=PlaneView(slant=45, fov=55))
     before, after = (
         np.log(scale_maps.from_mask(scale_maps.auto_mask(picture), trend="plane")).std()
-        for picture in (FLOOR, result.image)
+        for picture in (look_at_floor(), result.image)
     )
     assert after < 0.4 * before
     assert result.report["plane"]["slant"] == 45
@@ -44,8 +49,8 @@ def test_scales_are_even() -> None:
 
 
 def test_pixels_are_the_photograph_s() -> None:
-    result = texrs.rectify(FLOOR, view=PLANE)
-    np.testing.assert_array_equal(result.source_map.render(FLOOR, antialias=True), result.image)
+    result = texrs.rectify(look_at_floor(), view=PLANE)
+    np.testing.assert_array_equal(result.source_map.render(look_at_floor(), antialias=True), result.image)
     np.testing.assert_array_equal(result.stages["before_blending"], result.image)
     # A map in register with the photograph is looked up too. This one contains the pixel coordinates.
     places = np.moveaxis(np.indices(PLANE.shape), 0, -1).astype(np.float32)
@@ -62,7 +67,7 @@ def test_normals_turn_with_the_plane() -> None:
     right = np.empty((*PLANE.shape, 3), np.uint8)
     right[...] = np.rint((np.array([0.6, 0.0, 0.8]) + 1) * 127.5)
     for turn, leans in ((0, (0.6, 0.0)), (90, (0.0, 0.6)), (180, (-0.6, 0.0))):
-        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, rotation=turn)).source_map
+        source = texrs.rectify(look_at_floor(), view=Plane(PLANE.shape, 0, 90, rotation=turn)).source_map
         found = texrs.apply(source, right, map_type="normal") / 127.5 - 1
         np.testing.assert_allclose(found.reshape(-1, 3).mean(axis=0), (*leans, 0.8), atol=0.02)
         # Heights are plain numbers, so they only move.
@@ -73,7 +78,7 @@ def test_normals_turn_with_the_plane() -> None:
 def test_materials_become_flat_and_cyclic(size: int | tuple[int, int] | None) -> None:
     normals = np.empty((*PLANE.shape, 3), np.uint8)
     normals[...] = (128, 128, 255)
-    maps = {"albedo": FLOOR, "height": FLOOR[..., :1].astype(np.uint16) * 257, "normal": normals}
+    maps = {"albedo": look_at_floor(), "height": look_at_floor()[..., :1].astype(np.uint16) * 257, "normal": normals}
     made = texrs.rectify(texrs.Material(maps), view=PLANE, wrap=True, size=size)
     assert made.material is not None
     shapes = {name: each.pixels.shape[:2] for name, each in made.material.items()}
@@ -89,7 +94,7 @@ def test_materials_become_flat_and_cyclic(size: int | tuple[int, int] | None) ->
 
 @pytest.mark.parametrize("dtype", [np.uint16, np.float32])
 def test_dtypes_and_channels_stay(dtype: type) -> None:
-    grey = FLOOR[..., 0].astype(dtype)
+    grey = look_at_floor()[..., 0].astype(dtype)
     result = texrs.rectify(grey, view=PLANE)
     assert result.image.dtype == dtype
     assert result.image.ndim == 2
@@ -97,14 +102,14 @@ def test_dtypes_and_channels_stay(dtype: type) -> None:
 
 
 def test_any_size_and_cyclic() -> None:
-    whole = texrs.rectify(FLOOR, view=PLANE)
+    whole = texrs.rectify(look_at_floor(), view=PLANE)
     rows, columns = whole.image.shape[:2]
-    middle = texrs.rectify(FLOOR, view=PLANE, size=(rows - 10, columns - 20))
+    middle = texrs.rectify(look_at_floor(), view=PLANE, size=(rows - 10, columns - 20))
     np.testing.assert_array_equal(middle.source_map.coordinates, whole.source_map.coordinates[5:-5, 10:-10])
-    larger = texrs.rectify(FLOOR, view=PLANE, size=(rows + 64, columns), seed=3)
+    larger = texrs.rectify(look_at_floor(), view=PLANE, size=(rows + 64, columns), seed=3)
     assert larger.image.shape[:2] == (rows + 64, columns)
     assert larger.report["grown"] == "design"
-    cyclic = texrs.rectify(FLOOR, view=PLANE, wrap=True, size=128)
+    cyclic = texrs.rectify(look_at_floor(), view=PLANE, wrap=True, size=128)
     assert cyclic.image.shape == (128, 128, 3)
     image = cyclic.image.astype(float)
     inside = np.abs(np.diff(image, axis=0)).mean()
@@ -129,7 +134,7 @@ def test_doubtful_planes_are_told() -> None:
 def test_only_the_ground_is_used() -> None:
     ground = np.zeros(PLANE.shape, bool)
     ground[100:, 40:] = True
-    result = texrs.rectify(FLOOR, view=PlaneView(plane=PLANE, ground=ground))
+    result = texrs.rectify(look_at_floor(), view=PlaneView(plane=PLANE, ground=ground))
     rows, columns = np.rint(result.source_map.coordinates).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].mean() > 0.99
 
@@ -137,18 +142,24 @@ def test_only_the_ground_is_used() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: must have the shape of the image, 240 x 288"),
-        (lambda: texrs.rectify(FLOOR, view=[PLANE, PLANE]), "view: must be one plane, got a sequence"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: must be a number"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: must be at most|almost no part"),
-        (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),
-        (lambda: texrs.rectify(FLOOR, view=PlaneView(slant=88, fov=10)), "sharp|in front of its horizon"),
         (
-            lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((240, 288), bool))),
+            lambda: texrs.rectify(look_at_floor(), view=Plane((9, 9), 0)),
+            "plane: must have the shape of the image, 240 x 288",
+        ),
+        (lambda: texrs.rectify(look_at_floor(), view=[PLANE, PLANE]), "view: must be one plane, got a sequence"),
+        (lambda: texrs.rectify(look_at_floor(), view=PLANE, resolution=9), "resolution: must be a number"),
+        (
+            lambda: texrs.rectify(look_at_floor(), view=PLANE, resolution=7.9),
+            "resolution: must be at most|almost no part",
+        ),
+        (lambda: texrs.rectify(look_at_floor(), view=PLANE, size=8), "size"),
+        (lambda: texrs.rectify(look_at_floor(), view=PlaneView(slant=88, fov=10)), "sharp|in front of its horizon"),
+        (
+            lambda: texrs.rectify(look_at_floor(), view=PlaneView(ground=np.zeros((240, 288), bool))),
             "ground: must mark at least one pixel",
         ),
-        (lambda: texrs.rectify(FLOOR, view=PlaneView(ground=np.zeros((9, 9), bool))), "ground"),
-        (lambda: texrs.rectify(FLOOR[:32], view=PLANE), "image: each side must be at least 64"),
+        (lambda: texrs.rectify(look_at_floor(), view=PlaneView(ground=np.zeros((9, 9), bool))), "ground"),
+        (lambda: texrs.rectify(look_at_floor()[:32], view=PLANE), "image: each side must be at least 64"),
     ],
 )
 def test_what_cannot_be_rectified_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -158,7 +169,7 @@ def test_what_cannot_be_rectified_gets_a_sentence(make: Callable[[], object], wo
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     photo, out, source = (str(tmp_path / n) for n in ("floor.png", "flat.png", "map.npz"))
-    io.write(photo, FLOOR)
+    io.write(photo, look_at_floor())
     assert (
         main(
             [
@@ -179,7 +190,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         == 0
     )
     assert "slant 45.0 and tilt 90.0" in capsys.readouterr().err
-    np.testing.assert_array_equal(io.read(out), texrs.rectify(FLOOR, view=PlaneView(slant=45, fov=55)).image)
+    np.testing.assert_array_equal(io.read(out), texrs.rectify(look_at_floor(), view=PlaneView(slant=45, fov=55)).image)
     assert json.loads((tmp_path / "s" / "report.json").read_text())["plane"]["fov"] == 55
     assert main(["apply", source, photo, "-o", str(tmp_path / "again.png")]) == 0
     corners = PLANE.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
@@ -196,7 +207,7 @@ def test_what_a_camera_states_is_used(tmp_path: Path) -> None:
     exif = Image.Exif()
     exif.get_ifd(0x8769)[0xA405] = 28
     photo, out = tmp_path / "floor.jpg", tmp_path / "flat.png"
-    Image.fromarray(FLOOR).save(photo, exif=exif, quality=95)
+    Image.fromarray(look_at_floor()).save(photo, exif=exif, quality=95)
     fov = io.read_fov(photo)
     assert fov == pytest.approx(65.47, abs=0.01)
     said = ["rectify", str(photo), "-o", str(out), "--slant", "45"]

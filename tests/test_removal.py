@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,9 @@ def test_light_is_followed() -> None:
         np.testing.assert_array_equal(made.image[kept], seen[kept])
     assert off[True] < 0.6 * off[False]
     # In even light there is nothing to follow.
-    even = [texrs.remove(FLOOR, MARKED, view=PLANE, match_lighting=light, seed=1).image for light in (False, True)]
+    even = [
+        texrs.remove(look_at_floor(), MARKED, view=PLANE, match_lighting=light, seed=1).image for light in (False, True)
+    ]
     np.testing.assert_array_equal(*even)
 
 
@@ -186,7 +189,9 @@ def test_parts_that_meet_in_no_line_go_on_where_they_are_nearer() -> None:
 
 def test_seams_may_run_a_little_around_it() -> None:
     rows, columns = np.nonzero(
-        (texrs.remove(FLOOR, MARKED, view=PLANE, margin=2, boundary_width=5).image != FLOOR).any(axis=2)
+        (texrs.remove(look_at_floor(), MARKED, view=PLANE, margin=2, boundary_width=5).image != look_at_floor()).any(
+            axis=2
+        )
     )
     assert 63 <= rows.min() <= 68
     assert 91 <= columns.max() <= 97
@@ -240,7 +245,11 @@ def test_grey_pictures_of_16_bit_and_again() -> None:
     np.testing.assert_array_equal(one.source_map.render(floor), one.image)
 
 
-FLOOR = look("pebbles", PLANE)
+@cache
+def look_at_floor() -> np.ndarray:
+    return look("pebbles", PLANE)
+
+
 MARKED = np.zeros(SIZE, bool)
 MARKED[70:90, 60:90] = True
 
@@ -248,35 +257,41 @@ MARKED[70:90, 60:90] = True
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: texrs.remove(FLOOR, ~(MARKED | True)), "mask: marks nothing"),
-        (lambda: texrs.remove(FLOOR, MARKED | True), "mask: must leave pixels to copy from"),
-        (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
+        (lambda: texrs.remove(look_at_floor(), ~(MARKED | True)), "mask: marks nothing"),
+        (lambda: texrs.remove(look_at_floor(), MARKED | True), "mask: must leave pixels to copy from"),
+        (lambda: texrs.remove(look_at_floor(), MARKED[:40]), "mask: "),
         (
-            lambda: texrs.remove(FLOOR, MARKED, view=PlaneView(ground=MARKED)),
+            lambda: texrs.remove(look_at_floor(), MARKED, view=PlaneView(ground=MARKED)),
             "ground: must have pixels outside the hole",
         ),
-        (lambda: texrs.remove(FLOOR, MARKED, view=[]), "view: must contain at least one"),
-        (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, PLANE]), "ground: must be given for all but one"),
+        (lambda: texrs.remove(look_at_floor(), MARKED, view=[]), "view: must contain at least one"),
+        (lambda: texrs.remove(look_at_floor(), MARKED, view=[PLANE, PLANE]), "ground: must be given for all but one"),
         (
-            lambda: texrs.remove(FLOOR, MARKED, view=[PlaneView(ground=~MARKED), PlaneView(ground=~MARKED)]),
+            lambda: texrs.remove(look_at_floor(), MARKED, view=[PlaneView(ground=~MARKED), PlaneView(ground=~MARKED)]),
             "ground: must have pixels outside the hole",
         ),
         (
-            lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, PlaneView(ground=MARKED | True)]),
+            lambda: texrs.remove(look_at_floor(), MARKED, view=[PLANE, PlaneView(ground=MARKED | True)]),
             "ground: the other planes leave",
         ),
-        (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
-        (lambda: texrs.remove(FLOOR, MARKED, patch_size=2), "patch_size: "),
-        (lambda: texrs.remove(FLOOR, MARKED, boundary_width=65), "boundary_width: "),
-        (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: must be a texrs.PlaneView"),
-        (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
-        (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: must mark at least one"),
+        (lambda: texrs.remove(look_at_floor(), MARKED, margin=65), "margin: "),
+        (lambda: texrs.remove(look_at_floor(), MARKED, patch_size=2), "patch_size: "),
+        (lambda: texrs.remove(look_at_floor(), MARKED, boundary_width=65), "boundary_width: "),
+        (lambda: texrs.remove(look_at_floor(), MARKED, view=40), "view: must be a texrs.PlaneView"),
+        (lambda: texrs.remove(look_at_floor()[:40], MARKED[:40]), "each side must be at least 64"),
+        (lambda: planes.find_ground(look_at_floor(), known=MARKED & False), "known: must mark at least one"),
         (
-            lambda: texrs.inpaint(FLOOR, MARKED, allowed=MARKED),
+            lambda: texrs.inpaint(look_at_floor(), MARKED, allowed=MARKED),
             "allowed: must mark at least one pixel outside the hole",
         ),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: cannot be combined"),
-        (lambda: texrs.inpaint(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: cannot be combined"),
+        (
+            lambda: texrs.inpaint(look_at_floor(), MARKED, allowed=~MARKED, method="optimise"),
+            "allowed: cannot be combined",
+        ),
+        (
+            lambda: texrs.inpaint(look_at_floor(), MARKED, allowed=~MARKED, exemplar=look_at_floor()),
+            "allowed: cannot be combined",
+        ),
     ],
 )
 def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -287,18 +302,18 @@ def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: 
 def test_patches_come_from_where_they_may() -> None:
     allowed = np.zeros(SIZE, bool)
     allowed[100:, :] = True
-    made = texrs.inpaint(FLOOR, MARKED, allowed=allowed)
+    made = texrs.inpaint(look_at_floor(), MARKED, allowed=allowed)
     assert (made.source_map.coordinates[MARKED][:, 0] >= 99.5).all()
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     photo, mask, out = (str(tmp_path / f"{name}.png") for name in ("photo", "mask", "out"))
-    io.write(photo, FLOOR)
+    io.write(photo, look_at_floor())
     io.write(mask, MARKED.astype(np.uint8) * 255)
     assert main(["remove", photo, mask, "-o", out, "--slant", "48", "--fov", "55", "--seed", "2"]) == 0
     assert "slant 48.0" in capsys.readouterr().err
     np.testing.assert_array_equal(
-        io.read(out), texrs.remove(FLOOR, MARKED, view=PlaneView(slant=48, fov=55), seed=2).image
+        io.read(out), texrs.remove(look_at_floor(), MARKED, view=PlaneView(slant=48, fov=55), seed=2).image
     )
     assert main(["remove", photo, mask, "-o", str(tmp_path / "no.png"), "--margin", "99"]) == 2
     assert "--margin" in capsys.readouterr().err
@@ -324,7 +339,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_photograph_is_extended_to_a_size() -> None:
-    made = texrs.extend(FLOOR, size=(196, 260), view=PLANE, seed=1)
+    made = texrs.extend(look_at_floor(), size=(196, 260), view=PLANE, seed=1)
     assert made.image.shape == (196, 260, 3)
     assert made.report["added"] == {"top": 8, "bottom": 8, "left": 10, "right": 10}
     steep = Plane(SIZE, 62, 90, fov=55)
@@ -334,4 +349,4 @@ def test_a_photograph_is_extended_to_a_size() -> None:
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
     with pytest.raises(InvalidInput, match=r"size: must be at least \(180, 240\) pixels"):
-        texrs.extend(FLOOR, size=(100, 300), view=PLANE)
+        texrs.extend(look_at_floor(), size=(100, 300), view=PLANE)

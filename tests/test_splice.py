@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,11 @@ from texrs.papers.splice.factors import _FACTORS
 SIZE = (192, 192)
 
 
+@cache
 def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> ElementAnalysis:
     return ElementAnalysis.of_sample(samples.load(name, size=size, seed=seed))
 
 
-ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "leaves_and_flowers", "net", "bricks")}
 PAIRS = [("dots", "pebbles"), ("dots", "bricks"), ("pebbles", "dots"), ("leaves_and_flowers", "pebbles")]
 
 
@@ -36,7 +37,7 @@ def spliced() -> Callable[[str, str], texrs.Synthesis]:
 
     def get(a: str, b: str) -> texrs.Synthesis:
         if (a, b) not in made:
-            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], use_cells=False, seed=1, screening=None)
+            made[a, b] = texrs.splice(entry(a), entry(b), use_cells=False, seed=1, screening=None)
         return made[a, b]
 
     return get
@@ -44,7 +45,7 @@ def spliced() -> Callable[[str, str], texrs.Synthesis]:
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_every_element_is_there_whole_and_in_its_place(a: str, b: str, spliced: Any) -> None:
-    mine, result = ENTRIES[a], spliced(a, b)
+    mine, result = entry(a), spliced(a, b)
     found, away = checks.presence(mine, result)
     irregular = a == "pebbles"
     assert found >= (0.8 if irregular else 0.95), "S2"
@@ -58,7 +59,7 @@ def test_every_element_is_there_whole_and_in_its_place(a: str, b: str, spliced: 
 
 @pytest.mark.parametrize(("a", "b"), [*PAIRS, ("net", "pebbles"), ("bricks", "dots")])
 def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
-    mine, result = ENTRIES[a], spliced(a, b)
+    mine, result = entry(a), spliced(a, b)
     colours, matched = checks.copied(mine, result)
     assert colours == 1.0, "S5"
     # Connected figures are bent, so none of their pixels belongs to an element that moved as a whole.
@@ -73,7 +74,7 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_the_ground_is_like_the_texture_s(a: str, b: str, spliced: Any) -> None:
-    found = checks.coherence(ENTRIES[a], spliced(a, b))
+    found = checks.coherence(entry(a), spliced(a, b))
     # Only pebbles in the layout of dots do not leave enough background to measure.
     assert found is not None or (a, b) == ("pebbles", "dots")
     assert found is None or found[0] <= 1.3 or found[1] <= 0.08, "S8"
@@ -81,7 +82,7 @@ def test_the_ground_is_like_the_texture_s(a: str, b: str, spliced: Any) -> None:
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_the_arrangement_is_the_other_one_s(a: str, b: str, spliced: Any) -> None:
-    found = checks.layout(spliced(a, b), ENTRIES[a], ENTRIES[b])
+    found = checks.layout(spliced(a, b), entry(a), entry(b))
     assert found["spacing"] <= 0.05, "S10"
     assert found["nearest"] <= 0.05, "S10"
     assert found["away"] <= 0.5, "S3"
@@ -91,14 +92,14 @@ def test_the_arrangement_is_the_other_one_s(a: str, b: str, spliced: Any) -> Non
 
 @pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
 def test_nothing_moved_nothing_changed(name: str) -> None:
-    mine = ENTRIES[name]
+    mine = entry(name)
     for edit in ({"op": "move", "element": 1, "by": 0}, {"op": "shift", "by": 0}, {"op": "scale", "factor": 1}):
         assert (texrs.self_splice(mine, edit).image == mine.image).all(), "S9"
 
 
 @pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
 def test_moving_all_moves_the_picture(name: str) -> None:
-    mine = ENTRIES[name]
+    mine = entry(name)
     image = texrs.self_splice(mine, {"op": "shift", "by": [5, -3]}).image
     same = (image[5:, :-3] == mine.image[:-5, 3:]).all(axis=-1)
     if name in ("net", "bricks"):
@@ -204,7 +205,7 @@ def test_an_element_moves_whole_where_its_centre_lies_beside_it(shape: str, midd
 
 def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
     """Triangles between them carry moved points, and the mesh carries the rest: each reaches its own pixels."""
-    mine = ENTRIES["dots"]
+    mine = entry("dots")
     listed = texrs.self_splice(mine, {"op": "move", "element": 12, "by": [6, 4]})
     changed = np.argwhere((listed.image != mine.image).any(axis=-1))
     assert len(changed)
@@ -222,16 +223,16 @@ def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
 
 
 def test_previews_are_drawn_at_once() -> None:
-    result = texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], method="preview")
+    result = texrs.splice(entry("dots"), entry("pebbles"), method="preview")
     assert result.image.shape == (*SIZE, 3)
-    plain = texrs.self_splice(ENTRIES["dots"], {"op": "shift", "by": 0}, method="preview")
-    assert (plain.image[20:-20, 20:-20] == ENTRIES["dots"].image[20:-20, 20:-20]).all()
+    plain = texrs.self_splice(entry("dots"), {"op": "shift", "by": 0}, method="preview")
+    assert (plain.image[20:-20, 20:-20] == entry("dots").image[20:-20, 20:-20]).all()
 
 
 @pytest.mark.parametrize("name", ["dots", "net", "bricks"])
 def test_the_literal_method(name: str) -> None:
-    result = texrs.splice(ENTRIES[name], ENTRIES["pebbles"], method="paper", seed=2)
-    assert checks.copied(ENTRIES[name], result)[0] == 1.0
+    result = texrs.splice(entry(name), entry("pebbles"), method="paper", seed=2)
+    assert checks.copied(entry(name), result)[0] == 1.0
 
 
 # --- promises of the house -------------------------------------------------------------------------------------------
@@ -243,32 +244,32 @@ def test_threads_do_not_matter(a: str, b: str) -> None:
     for count in (1, 2, 7):
         _FACTORS.clear()
         with texrs.threads(count):
-            found.append(texrs.splice(ENTRIES[a], ENTRIES[b], (96, 112), seed=3).image.tobytes())
+            found.append(texrs.splice(entry(a), entry(b), (96, 112), seed=3).image.tobytes())
     assert found[0] == found[1] == found[2]
 
 
 def test_any_dtype_and_channels() -> None:
-    mine = ENTRIES["dots"]
-    usual = texrs.splice(mine, ENTRIES["pebbles"], 96, screening=None).image
+    mine = entry("dots")
+    usual = texrs.splice(mine, entry("pebbles"), 96, screening=None).image
     wide = replace(mine, image=mine.image.astype(np.uint16) * 257)
-    assert (texrs.splice(wide, ENTRIES["pebbles"], 96, screening=None).image == usual.astype(np.uint16) * 257).all()
+    assert (texrs.splice(wide, entry("pebbles"), 96, screening=None).image == usual.astype(np.uint16) * 257).all()
     grey = replace(mine, image=mine.image[..., 0])
-    assert texrs.splice(grey, ENTRIES["pebbles"], (64, 96)).image.shape == (64, 96)
+    assert texrs.splice(grey, entry("pebbles"), (64, 96)).image.shape == (64, 96)
     floats = replace(mine, image=mine.image.astype(np.float32) * 4 - 2)
-    assert texrs.splice(floats, ENTRIES["pebbles"], 64).image.dtype == np.float32
+    assert texrs.splice(floats, entry("pebbles"), 64).image.dtype == np.float32
 
 
 def test_pictures_are_analysed() -> None:
     image = samples.load("dots", size=(96, 96)).image
-    assert texrs.splice(image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
-    assert texrs.splice(image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
+    assert texrs.splice(image, entry("pebbles"), 64).image.shape == (64, 64, 3)
+    assert texrs.splice(image[..., 1], entry("pebbles"), 64).image.shape == (64, 64)
     with pytest.raises(InvalidInput, match="^elements: "):
-        texrs.splice(np.zeros((40, 40)), ENTRIES["pebbles"])
+        texrs.splice(np.zeros((40, 40)), entry("pebbles"))
 
 
 def test_maps_in_register_come_out_in_register() -> None:
-    mine = ENTRIES["bricks"]
-    result = texrs.splice(mine, ENTRIES["pebbles"], 128, use_cells=False, seed=1)
+    mine = entry("bricks")
+    result = texrs.splice(mine, entry("pebbles"), 128, use_cells=False, seed=1)
     height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
     rows, columns = np.moveaxis(result.source_map.coordinates.astype(int), -1, 0)
     assert (result.source_map.render(height) == height[rows, columns]).all()
@@ -286,7 +287,7 @@ def test_maps_in_register_come_out_in_register() -> None:
 
 def test_progress_and_stopping() -> None:
     seen: list[str] = []
-    texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96, progress=lambda name, share: seen.append(name))
+    texrs.splice(entry("dots"), entry("pebbles"), 96, progress=lambda name, share: seen.append(name))
     assert list(dict.fromkeys(seen))[:3] == ["match", "deform", "warp"]
     assert seen[-1] == "done"
 
@@ -295,11 +296,11 @@ def test_progress_and_stopping() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96, progress=stop)
+        texrs.splice(entry("dots"), entry("pebbles"), 96, progress=stop)
 
 
 def test_stages_are_pictures(tmp_path: Any) -> None:
-    result = texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96)
+    result = texrs.splice(entry("dots"), entry("pebbles"), 96)
     assert {
         "source points",
         "target points",
@@ -313,8 +314,8 @@ def test_stages_are_pictures(tmp_path: Any) -> None:
 
 
 def test_edits_replay() -> None:
-    first = texrs.self_splice(ENTRIES["dots"], [{"op": "regularise", "amount": 0.5}, "randomise"], seed=7)
-    again = texrs.self_splice(ENTRIES["dots"], first.report["edit"], seed=7)
+    first = texrs.self_splice(entry("dots"), [{"op": "regularise", "amount": 0.5}, "randomise"], seed=7)
+    again = texrs.self_splice(entry("dots"), first.report["edit"], seed=7)
     assert (first.image == again.image).all()
 
 
@@ -353,7 +354,7 @@ def test_regular_layouts() -> None:
 )
 def test_bad_entries(change: dict[str, Any], words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
-        texrs.splice(replace(ENTRIES["dots"], **change), ENTRIES["pebbles"])
+        texrs.splice(replace(entry("dots"), **change), entry("pebbles"))
 
 
 @pytest.mark.parametrize(
@@ -374,11 +375,11 @@ def test_bad_entries(change: dict[str, Any], words: str) -> None:
 )
 def test_bad_edits(edit: Any, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
-        texrs.self_splice(ENTRIES["dots"], edit)
+        texrs.self_splice(entry("dots"), edit)
 
 
 def test_bad_options() -> None:
-    a, b = ENTRIES["dots"], ENTRIES["pebbles"]
+    a, b = entry("dots"), entry("pebbles")
     with pytest.raises(InvalidInput, match="method"):
         texrs.splice(a, b, method="fast")  # type: ignore[arg-type]
     with pytest.raises(InvalidInput, match="size"):
@@ -391,8 +392,8 @@ def test_bad_options() -> None:
 
 @pytest.mark.parametrize("name", ["dots", "bricks"])
 def test_no_strength_leaves_the_layout_as_it_is(name: str) -> None:
-    mine = ENTRIES[name]
-    result = texrs.splice(mine, ENTRIES["pebbles"], use_cells=False, strength=0.0, seed=1)
+    mine = entry(name)
+    result = texrs.splice(mine, entry("pebbles"), use_cells=False, strength=0.0, seed=1)
     matches = result.report["matches"]
     assert {m["displacement_reached"] for m in matches} == {None}
     assert result.report["displacement_reached"] == 1
@@ -401,9 +402,7 @@ def test_no_strength_leaves_the_layout_as_it_is(name: str) -> None:
 
 
 def test_part_of_the_way_is_part_of_the_way() -> None:
-    half, full = (
-        texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], strength=s, refine=False, seed=1) for s in (0.5, 1.0)
-    )
+    half, full = (texrs.splice(entry("dots"), entry("pebbles"), strength=s, refine=False, seed=1) for s in (0.5, 1.0))
     assert len(half.report["matches"]) > len(full.report["matches"]), "elements stay that would be erased"
     for one, all_ in zip(half.report["matches"], full.report["matches"], strict=False):
         assert one["element"] == all_["element"]
@@ -423,12 +422,12 @@ def test_layouts_that_shrink_leave_no_bare_margin(name: str, factor: float) -> N
 @pytest.mark.parametrize("name", ["net", "bricks"])
 def test_what_is_connected_cannot_be_removed(name: str) -> None:
     with pytest.raises(InvalidInput, match="the step remove needs separate elements"):
-        texrs.self_splice(ENTRIES[name], [{"op": "shift", "by": 2}, {"op": "remove", "element": 3}])
+        texrs.self_splice(entry(name), [{"op": "shift", "by": 2}, {"op": "remove", "element": 3}])
 
 
 @pytest.mark.parametrize("off", [(11, 11), (0, 12)])
 def test_elements_are_moved_whose_centre_is_not_their_own(off: tuple[int, int]) -> None:
-    mine = ENTRIES["dots"]
+    mine = entry("dots")
     points = mine.points.copy()
     points[5] = np.clip(points[5] + off, 0, min(mine.mask.shape) - 1)
     result = texrs.self_splice(replace(mine, points=points), {"op": "move", "element": 5, "by": [6, -9]})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,18 @@ from texrs.errors import InvalidInput, LimitExceeded
 from texrs.point_sets import nearest_distances, spacing
 
 
+@cache
 def entry(name: str, size: tuple[int, int] = (128, 128)) -> ElementAnalysis:
     return ElementAnalysis.of_sample(samples.load(name, size=size))
 
 
-ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "net", "bricks")}
+NAMES = ("dots", "pebbles", "net", "bricks")
 LARGE = (192, 208)
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_layout_goes_on(name: str) -> None:
-    mine = ENTRIES[name]
+    mine = entry(name)
     result = texrs.self_splice(mine, size=LARGE, seed=1)
     assert result.image.shape == (*LARGE, 3)
     assert (result.report["edit"], result.stages["resized"] is result.image) == ([], True)
@@ -40,10 +42,10 @@ def test_the_layout_goes_on(name: str) -> None:
     assert (points.max(axis=0) > np.array(LARGE) - edge).all()
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("edit", [None, {"op": "randomise", "amount": 0.1}])
 def test_the_map_looks_into_the_texture(name: str, edit: Any) -> None:
-    mine = ENTRIES[name]
+    mine = entry(name)
     result = texrs.self_splice(mine, edit, LARGE, seed=1, screening=None)
     assert result.source_map.shapes == ((128, 128),)
     np.testing.assert_array_equal(result.source_map.render(mine.image), result.image)
@@ -74,7 +76,7 @@ def test_every_separate_element_is_shown_whole() -> None:
 
 
 def test_steps_are_done_in_the_larger_texture() -> None:
-    mine = ENTRIES["dots"]
+    mine = entry("dots")
     plain = texrs.self_splice(mine, size=LARGE, seed=1)
     points = np.array(plain.report["elements"])
     inner = int(np.hypot(*(points - np.array(LARGE) / 2).T).argmin())
@@ -92,9 +94,9 @@ def test_steps_are_done_in_the_larger_texture() -> None:
     np.testing.assert_array_equal(again.image, result.image)
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_smaller_one_is_the_middle(name: str) -> None:
-    mine = ENTRIES[name]
+    mine = entry(name)
     result = texrs.self_splice(mine, size=(96, 100))
     np.testing.assert_array_equal(result.image, mine.image[16:112, 14:114])
     same = texrs.self_splice(mine, size=128)
@@ -118,17 +120,17 @@ def test_a_smaller_one_is_the_middle(name: str) -> None:
 )
 def test_bad_sizes_are_refused(size: Any, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
-        texrs.self_splice(ENTRIES["dots"], size=size)
+        texrs.self_splice(entry("dots"), size=size)
 
 
 def test_a_size_without_elements_has_no_layout_to_edit() -> None:
-    assert texrs.self_splice(ENTRIES["dots"], size=16).image.shape == (16, 16, 3)
+    assert texrs.self_splice(entry("dots"), size=16).image.shape == (16, 16, 3)
     with pytest.raises(
         InvalidInput, match=r"size: must be large enough for the \d elements .* got \(16, 16\), .* is 0"
     ):
-        texrs.self_splice(ENTRIES["dots"], "randomise", 16)
+        texrs.self_splice(entry("dots"), "randomise", 16)
 
 
 @pytest.mark.parametrize("method", ["paper", "preview"])
 def test_methods_take_sizes(method: Any) -> None:
-    assert texrs.self_splice(ENTRIES["net"], "regularise", (160, 144), method=method).image.shape == (160, 144, 3)
+    assert texrs.self_splice(entry("net"), "regularise", (160, 144), method=method).image.shape == (160, 144, 3)
