@@ -1,6 +1,7 @@
 """The notebooks of the examples run from top to bottom."""
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
 
 
+@cache
 def run(notebook: Path) -> dict[str, Any]:
-    """Execute the cells of a notebook, and return the names that they define."""
+    """Execute the cells of a notebook once, and return the names that they define."""
     names: dict[str, Any] = {}
     for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
         if cell["cell_type"] == "code":
