@@ -20,7 +20,8 @@ from texrs import samples
 Capture = pytest.CaptureFixture[str]
 COLOURS = samples.load("dots", size=(64, 64)).image
 GREY = np.ascontiguousarray(COLOURS[..., 1])
-TINY = ("--size", "48", "--copies", "1")
+TINY = ("--size", "48", "--copies", "1", "--way", "still")
+"""Options of the fastest designs: the default tries several ways, which takes seconds."""
 
 
 def files(folder: Path) -> dict[str, bytes]:

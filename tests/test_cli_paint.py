@@ -47,6 +47,7 @@ def test_an_atlas_and_its_provenance(here: Path, capsys: pytest.CaptureFixture[s
 def test_a_material_in_16_bit_along_an_axis_as_obj(here: Path) -> None:
     texrs.Material({"albedo": STRIPES, "height": STRIPES[..., 0]}, axes=3).save("block")
     words = ["paint", "ball.stl", "block", "-o", "a.obj", "--atlas", "32", "--bits", "16", "--directions", "around:z"]
+    words += ["--quality", "fast"]
     assert main([*words, "--along", "y", "--voxels", "1", "-q"]) == 0
     lines = Path("a.mtl").read_text().splitlines()
     named = {word: name for word, _, name in (line.partition(" ") for line in lines)}
