@@ -14,7 +14,7 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
-from texrs.fields._spaced import find_distances, space
+from texrs.fields._spaced import as_distances, find_distances, space
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
 from texrs.volume._values import check_field, guess_axes, turn_in_space
@@ -216,6 +216,8 @@ def compare(
     first, second = as_ndarray(exemplar, "exemplar", axes=known), as_ndarray(output, "output", axes=known)
     count = as_int(guess_axes(first) if axes is None else axes, "axes", 2, 3)
     spacing = find_distances(spacing, exemplar, count)
+    as_distances(spacing, count)
+    check_field(field, count)
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(
@@ -245,7 +247,6 @@ def compare(
     orientation, turned = None, None
     # Compare the layers of the output with the exemplar's normal, rotated by the field.
     if field is not None:
-        check_field(field, count)
         field = space(field, spacing).over(second.shape[:count])
         normal = structure.texture_normal(grey[0], spacing=spacing)
         errors = (
