@@ -62,7 +62,7 @@ test-rust: | requirements
 	cargo test --quiet --lib
 
 test-python: $(VENV)/.built
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q --durations=30
 
 # Property tests, all hostile values of all arguments, damaged files, and, with a nightly compiler, the targets in fuzz/. Each round
 # has a seed. Rounds run until one fails or the time is up; SEED repeats one round.
