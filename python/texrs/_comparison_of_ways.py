@@ -12,7 +12,7 @@ Six figures are measured, each 0 for a crop of the exemplar. None of them knows 
 
 Exemplars differ more in these figures than ways do, so only ways of one exemplar are compared. Each figure is divided by
 the sum of its mean over the ways and a floor. Below the floor, what the figure measures is hardly visible. The score is
-the mean of the square roots of these quotients.
+the mean of the square roots of these quotients. Ways with large unchanged patches are favoured (`FAVOURED`).
 Repetition is not a figure, because it does not agree with the eye.
 """
 
@@ -52,6 +52,12 @@ SOFT, APART = 6.0, 8
 """Standard deviation for averaging tones, and their distance from a seam when they are compared, in pixels."""
 PAIRS = 20_000
 """Number of pairs of neighbours for estimating the shares of the exemplar, to about 1 %."""
+FAVOURED = {"still": 0.8, "lattice": 0.8, "courses": 0.8}
+"""Factors of the scores of ways with large unchanged patches, which tear least.
+
+A reader graded 146 textures of 47 pictures. Chosen on 24 of them, where the best way is then taken for 91 % instead of
+74 %. On the other 23 it is 80 % instead of 65 %, and the mean grade (0 to 2) is 1.23 instead of 1.10, of at most 1.38.
+"""
 EQUAL = 0.02
 """Difference of scores below which two ways are equally good."""
 FLOORS = {
@@ -119,6 +125,7 @@ def try_ways(
         repetition, coverage = measure_use(salience, exemplar.shape, laid[0])
         use[name] = {"repetition": round(repetition, 4), "coverage": round(coverage, 4)}
     scores = compare(faults)
+    scores = {name: round(FAVOURED.get(name, 1.0) * score, 4) for name, score in scores.items()}
     return {name: {"score": scores[name], **faults[name].report(), **use[name]} for name in faults}
 
 

@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from texrs._show import brief
 from texrs._typing import Floats
-from texrs.exemplar.regularity import FRACTIONS, WINDOW, Lattice, bend, correlate, crop_light
+from texrs.exemplar.regularity import (
+    FRACTIONS,
+    REACH,
+    WINDOW,
+    Lattice,
+    as_reach,
+    bend,
+    correlate,
+    crop_light,
+    level_light,
+)
 from texrs.exemplar.shapes import widen
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
@@ -189,7 +199,8 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
 
 def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
     """Return True if a level image correlates better at lattice points than at other shifts along its courses."""
-    correlation = widen(correlate(crop_light(level)), 2)
+    light = crop_light(level)
+    correlation = widen(correlate(level_light(light), as_reach(light.shape, REACH)), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors
     times = np.arange(-max(reach), max(reach) + 1) if min(reach) < 30 else np.arange(-30, 31)

@@ -30,12 +30,28 @@ Vector = tuple[int, int]
 
 WINDOW = 512
 """Side of the central part of an image that is analysed, in pixels."""
-REACH = 0.45
-"""Maximum shift, as a share of a side. Longer shifts leave too small an overlap of the image with itself."""
+REACH, FAR_REACH = 0.45, 0.7
+"""Maximum shifts, as shares of a side. Longer shifts are only used if the lattice of shorter ones is doubtful."""
+OVERLAP = 0.15
+"""Minimum overlap of an image and its shifted copy, as a share of the image."""
 SHORTEST, PEAKS = 6, 8
 """Minimum period in pixels, and number of correlation peaks that are considered as periods."""
-REGULAR = 0.3
-"""Minimum mean correlation of an accepted lattice. Scattered elements have up to 0.2."""
+REGULAR, FAR_REGULAR = 0.3, 0.5
+"""Minimum mean correlation of an accepted lattice, and of one whose shifts exceed `REACH`.
+
+Scattered elements have up to 0.2.
+"""
+CHANCE = 3.5
+"""Minimum mean correlation of a lattice, in standard deviations of the correlation of scattered elements."""
+BETTER = 0.85
+"""Minimum ratio of two mean correlations for choosing the lattice with the smaller cell."""
+DOUBTED = 0.6
+"""Ratio of the correlations of near and far lattices below which the far one is used."""
+CLEARER = 1.5
+"""Ratio of the correlations of edges and of colours above which the lattice of the edges is used.
+
+Blocks of mixed colours have clear edges on a lattice, and colours that hardly repeat.
+"""
 DIP = 0.75
 """Maximum ratio of the smallest correlation between the centre and a peak to the correlation at the peak.
 
@@ -206,10 +222,17 @@ def find_lattice(guide: Floats) -> Lattice | None:
     found = []
     for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
         ask()
-        found.append(_fit_lattice(correlate(picture)))
-    believed = [each for each in found if each is not None and each.correlation >= REGULAR]
+        correlation = correlate(level_light(picture), as_reach(picture.shape, FAR_REACH))
+        near = _fit_lattice(correlation, picture.shape, REACH, REGULAR)
+        far = _fit_lattice(correlation, picture.shape, FAR_REACH, FAR_REGULAR)
+        # Short vectors of a coarse lattice join similar parts of its cell.
+        better = far is not None and (near is None or near.correlation < DOUBTED * far.correlation)
+        found.append(far if better else near)
+    first, second = found
     # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
-    return believed[0] if believed else None
+    if first is None or (second is not None and second.correlation > CLEARER * first.correlation):
+        return second
+    return first
 
 
 def crop_light(guide: Floats) -> Floats:
@@ -219,31 +242,54 @@ def crop_light(guide: Floats) -> Floats:
     return light
 
 
-def correlate(picture: Floats) -> Floats:
-    """Return the autocorrelation of an image without slow changes. The zero shift is in the middle."""
-    from scipy.fft import irfft2, next_fast_len, rfft2
+def level_light(picture: Floats) -> Floats:
+    """Return a slightly blurred image without its slow changes."""
     from scipy.ndimage import gaussian_filter, uniform_filter
 
-    height, width = picture.shape
-    flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
-    size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
-    # Use double precision, because single-precision transforms differ in their last bits between processors.
-    spectrum = rfft2(flat.astype(np.float64), size)
-    product = irfft2(spectrum.real**2 + spectrum.imag**2, size)
-    rows, columns = (int(REACH * n) for n in picture.shape)
-    near = np.roll(product, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
-    shift = np.abs(np.arange(-rows, rows + 1)), np.abs(np.arange(-columns, columns + 1))
-    overlap = np.outer(height - shift[0], width - shift[1])
-    variance = max(float((flat.astype(np.float64) ** 2).mean()), 1e-12)
-    return np.asarray(near / overlap / variance, np.float32)
+    flat: Floats = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
+    return flat
 
 
-def _fit_lattice(correlation: Floats) -> Lattice | None:
-    """Return the lattice with the highest mean correlation, or None.
+def as_reach(shape: tuple[int, ...], share: float) -> tuple[int, int]:
+    """Return the number of rows and columns of a shift that is a share of the sides of an image."""
+    return int(share * shape[0]), int(share * shape[1])
 
-    Among nearly equal lattices, the one with the smallest cell is chosen.
+
+def correlate(picture: Floats, reach: tuple[int, int]) -> Floats:
+    """Return the autocorrelation of an image for shifts up to a number of rows and columns.
+
+    The zero shift is in the middle. Each shift is divided by the deviations of both overlapping parts, so that shifts
+    above half of an image are comparable. The correlation is 0 if too small a part overlaps.
     """
-    reach = np.array(correlation.shape) // 2
+    from scipy.fft import irfft2, next_fast_len, rfft2
+
+    # Use double precision, because single-precision transforms differ in their last bits between processors.
+    values = picture.astype(np.float64)
+    size = [next_fast_len(2 * n, real=True) for n in picture.shape]
+    whole, squares, ones = (rfft2(v, size) for v in (values, values**2, np.ones_like(values)))
+    first = irfft2(squares * np.conj(ones), size)
+    # The part that a shift moves onto another one is the other part of the opposite shift.
+    second = np.roll(first[::-1, ::-1], (1, 1), (0, 1))
+    found = irfft2(whole.real**2 + whole.imag**2, size) / np.sqrt(np.maximum(first * second, 1e-12))
+    rows, columns = reach
+    near = np.roll(found, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
+    return np.asarray(np.where(measure_overlap(picture.shape, reach) < OVERLAP, 0, near), np.float32)
+
+
+def measure_overlap(shape: tuple[int, ...], reach: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the shares of an image that overlap its shifted copies, up to a reach."""
+    down, across = (1 - np.abs(np.arange(-r, r + 1)) / n for r, n in zip(reach, shape, strict=True))
+    return np.outer(down, across)
+
+
+def _fit_lattice(correlation: Floats, shape: tuple[int, ...], share: float, least: float) -> Lattice | None:
+    """Return the lattice with the highest mean correlation within a share of an image, or None.
+
+    Among nearly equal lattices, the one with the smallest cell is chosen. The mean must be at least ``least``.
+    """
+    whole, reach = np.array(correlation.shape) // 2, np.array(as_reach(shape, share))
+    correlation = correlation[tuple(slice(w - r, w + r + 1) for w, r in zip(whole, reach, strict=True))]
+    overlap = measure_overlap(shape, (int(reach[0]), int(reach[1])))
     tolerant = widen(correlation, 2)
     rows, columns = (np.arange(-r, r + 1) for r in reach)
     far = np.add.outer(rows**2, columns**2) > SHORTEST**2
@@ -259,13 +305,13 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
             cell = abs(int(a[0] * b[1] - a[1] * b[0]))
             if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
                 continue
-            mean = _average(tolerant, a, b, reach)
-            if mean > 0 and all(_has_dip(correlation, v, reach) for v in (a, b)):
+            mean, deviation = _average(tolerant, a, b, reach), _measure_chance(correlation, overlap, a, shape)
+            if mean >= max(least, CHANCE * deviation) and all(_has_dip(correlation, v, reach) for v in (a, b)):
                 found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
     if not found:
         return None
     best = max(mean for mean, _ in found.values())
-    good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= 0.85 * best]
+    good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= BETTER * best]
     _, (first, second), mean = min(good)
     return Lattice(first, second, mean, _refine(correlation, first, second))
 
@@ -325,6 +371,19 @@ def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reac
     ahead = (places[:, 0] > 0) | ((places[:, 0] == 0) & (places[:, 1] > 0))
     places = places[ahead & (np.abs(places) <= reach - 2).all(axis=1)] + reach
     return float(correlation[tuple(places.T)].mean()) if len(places) >= 4 else 0.0
+
+
+def _measure_chance(
+    correlation: Floats, overlap: NDArray[np.float64], a: NDArray[np.intp], shape: tuple[int, ...]
+) -> float:
+    """Return the standard deviation of the correlation of scattered elements (Bartlett's formula).
+
+    The elements have the size of the peak at the zero shift, up to half of the shorter lattice vector.
+    """
+    rows, columns = (np.arange(n) - n // 2 for n in correlation.shape)
+    inside = np.add.outer(rows**2, columns**2) <= float(a @ a) / 4
+    area = float((correlation[inside].astype(np.float64) ** 2).sum())
+    return float(np.sqrt(area / (shape[0] * shape[1] * overlap[inside].mean())))
 
 
 def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:

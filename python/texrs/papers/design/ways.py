@@ -44,6 +44,8 @@ CLOSE = 0.5
 """Share of the exemplar's area above which its elements count as close to each other."""
 FEWEST = 6
 """Minimum number of whole elements for a new arrangement."""
+STRICT = 0.65
+"""Minimum correlation of a lattice for trying only ways that are in step with it."""
 SMALLEST = 12
 """Minimum size of cells that are bent, in pixels. The joints of smaller cells are not wide enough for cuts."""
 
@@ -56,9 +58,11 @@ def list_ways(plan: Plan) -> list[Way]:
     if plan.parts.kind == "grid":
         # Moved cells of a grid show more seams than patches, and nothing else.
         ways.remove("move")
-    if plan.parts.lattice is not None:
+    if plan.parts.lattice is not None and plan.parts.lattice.correlation >= STRICT:
         # The stitcher does not keep its patches in step with a lattice.
         ways = [way for way in ways if way in ("move", "lattice")]
+    elif plan.parts.lattice is not None:
+        ways = [way for way in ways if way in ("move", "lattice", "stitch", "cells")]
     else:
         ways.remove("lattice")
     return [way for way in ways if not find_obstacle(plan, way)]
