@@ -54,9 +54,10 @@ def test_moved_elements_are_not_taken_where_they_are_torn():
     assert texrs.design(grass, 192).report["way"] != ["move"]
 
 
-def test_elements_move_where_it_does_no_harm():
-    """Buttons on plain cloth are found reliably, so moved ones look as good."""
-    assert texrs.design(samples.dots((96, 96)).image, 64).report["way"] == ["move"]
+def test_moved_elements_do_little_harm_where_they_are_found():
+    """Buttons on plain cloth are found reliably, so moved ones look nearly as good."""
+    [tried] = texrs.design(samples.dots((96, 96)).image, 64).report["candidates"]
+    assert tried["move"]["score"] < 1.7 * min(each["score"] for each in tried.values())
 
 
 def scramble(shape, side, seed):

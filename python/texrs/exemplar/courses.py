@@ -200,7 +200,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
 def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
     """Return True if a level image correlates better at lattice points than at other shifts along its courses."""
     light = crop_light(level)
-    correlation = widen(correlate(level_light(light), as_reach(light.shape, REACH)), 2)
+    correlation = widen(correlate(level_light(light), as_reach(light.shape, REACH), whole=True), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors
     times = np.arange(-max(reach), max(reach) + 1) if min(reach) < 30 else np.arange(-30, 31)

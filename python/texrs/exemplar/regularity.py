@@ -42,7 +42,7 @@ REGULAR, FAR_REGULAR = 0.3, 0.5
 Scattered elements have up to 0.2.
 """
 CHANCE = 3.5
-"""Minimum mean correlation of a lattice, in standard deviations of the correlation of scattered elements."""
+"""Minimum mean correlation of a far lattice, in standard deviations of the correlation of scattered elements."""
 BETTER = 0.85
 """Minimum ratio of two mean correlations for choosing the lattice with the smaller cell."""
 DOUBTED = 0.6
@@ -208,7 +208,7 @@ def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
     return Lattice(a, b, lattice.correlation, (tuple(exact[0]), tuple(exact[1])))
 
 
-def find_lattice(guide: Floats) -> Lattice | None:
+def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
     """Find the lattice of an image, by autocorrelation of its lightness or edges."""
     from scipy.ndimage import gaussian_filter
 
@@ -222,12 +222,14 @@ def find_lattice(guide: Floats) -> Lattice | None:
     found = []
     for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
         ask()
-        correlation = correlate(level_light(picture), as_reach(picture.shape, FAR_REACH))
-        near = _fit_lattice(correlation, picture.shape, REACH, REGULAR)
-        far = _fit_lattice(correlation, picture.shape, FAR_REACH, FAR_REGULAR)
+        level = level_light(picture)
+        near = _fit_lattice(correlate(level, as_reach(level.shape, REACH), whole=True), level.shape, REGULAR, 0.0)
+        wide = None
+        if far:
+            wide = _fit_lattice(correlate(level, as_reach(level.shape, FAR_REACH)), level.shape, FAR_REGULAR, CHANCE)
         # Short vectors of a coarse lattice join similar parts of its cell.
-        better = far is not None and (near is None or near.correlation < DOUBTED * far.correlation)
-        found.append(far if better else near)
+        better = wide is not None and (near is None or near.correlation < DOUBTED * wide.correlation)
+        found.append(wide if better else near)
     first, second = found
     # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
     if first is None or (second is not None and second.correlation > CLEARER * first.correlation):
@@ -255,25 +257,31 @@ def as_reach(shape: tuple[int, ...], share: float) -> tuple[int, int]:
     return int(share * shape[0]), int(share * shape[1])
 
 
-def correlate(picture: Floats, reach: tuple[int, int]) -> Floats:
+def correlate(picture: Floats, reach: tuple[int, int], *, whole: bool = False) -> Floats:
     """Return the autocorrelation of an image for shifts up to a number of rows and columns.
 
     The zero shift is in the middle. Each shift is divided by the deviations of both overlapping parts, so that shifts
-    above half of an image are comparable. The correlation is 0 if too small a part overlaps.
+    above half of an image are comparable. With ``whole``, it is divided by the deviation of the whole image, which is
+    steadier for short shifts. The correlation is 0 if too small a part overlaps.
     """
     from scipy.fft import irfft2, next_fast_len, rfft2
 
     # Use double precision, because single-precision transforms differ in their last bits between processors.
     values = picture.astype(np.float64)
     size = [next_fast_len(2 * n, real=True) for n in picture.shape]
-    whole, squares, ones = (rfft2(v, size) for v in (values, values**2, np.ones_like(values)))
-    first = irfft2(squares * np.conj(ones), size)
-    # The part that a shift moves onto another one is the other part of the opposite shift.
-    second = np.roll(first[::-1, ::-1], (1, 1), (0, 1))
-    found = irfft2(whole.real**2 + whole.imag**2, size) / np.sqrt(np.maximum(first * second, 1e-12))
-    rows, columns = reach
+    spectrum = rfft2(values, size)
+    found, (rows, columns) = irfft2(spectrum.real**2 + spectrum.imag**2, size), reach
+    overlap = measure_overlap(picture.shape, reach)
+    if not whole:
+        squares, ones = (rfft2(v, size) for v in (values**2, np.ones_like(values)))
+        first = irfft2(squares * np.conj(ones), size)
+        # The part that a shift moves onto another one is the other part of the opposite shift.
+        second = np.roll(first[::-1, ::-1], (1, 1), (0, 1))
+        found /= np.sqrt(np.maximum(first * second, 1e-12))
     near = np.roll(found, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
-    return np.asarray(np.where(measure_overlap(picture.shape, reach) < OVERLAP, 0, near), np.float32)
+    if whole:
+        near = near / (overlap * values.size) / max(float((values**2).mean()), 1e-12)
+    return np.asarray(np.where(overlap < OVERLAP, 0, near), np.float32)
 
 
 def measure_overlap(shape: tuple[int, ...], reach: tuple[int, int]) -> NDArray[np.float64]:
@@ -282,13 +290,13 @@ def measure_overlap(shape: tuple[int, ...], reach: tuple[int, int]) -> NDArray[n
     return np.outer(down, across)
 
 
-def _fit_lattice(correlation: Floats, shape: tuple[int, ...], share: float, least: float) -> Lattice | None:
-    """Return the lattice with the highest mean correlation within a share of an image, or None.
+def _fit_lattice(correlation: Floats, shape: tuple[int, ...], least: float, chance: float) -> Lattice | None:
+    """Return the lattice with the highest mean correlation, or None.
 
-    Among nearly equal lattices, the one with the smallest cell is chosen. The mean must be at least ``least``.
+    Among nearly equal lattices, the one with the smallest cell is chosen. The mean must be at least ``least``, and
+    ``chance`` standard deviations of the correlation of scattered elements.
     """
-    whole, reach = np.array(correlation.shape) // 2, np.array(as_reach(shape, share))
-    correlation = correlation[tuple(slice(w - r, w + r + 1) for w, r in zip(whole, reach, strict=True))]
+    reach = np.array(correlation.shape) // 2
     overlap = measure_overlap(shape, (int(reach[0]), int(reach[1])))
     tolerant = widen(correlation, 2)
     rows, columns = (np.arange(-r, r + 1) for r in reach)
@@ -306,13 +314,15 @@ def _fit_lattice(correlation: Floats, shape: tuple[int, ...], share: float, leas
             if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
                 continue
             mean, deviation = _average(tolerant, a, b, reach), _measure_chance(correlation, overlap, a, shape)
-            if mean >= max(least, CHANCE * deviation) and all(_has_dip(correlation, v, reach) for v in (a, b)):
+            if mean > chance * deviation and all(_has_dip(correlation, v, reach) for v in (a, b)):
                 found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
     if not found:
         return None
     best = max(mean for mean, _ in found.values())
     good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= BETTER * best]
     _, (first, second), mean = min(good)
+    if mean < least:
+        return None
     return Lattice(first, second, mean, _refine(correlation, first, second))
 
 

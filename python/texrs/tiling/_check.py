@@ -151,7 +151,8 @@ def measure_tiling(
         raise InvalidInput(f"source_map: must have the size of the image, {guide.shape[:2]}, got {source.shape}")
     borders = [measure_border(guide, axis, enough=enough) if cyclic else None for axis, cyclic in enumerate(wrap)]
     if regular and any(each is not None and each.tiles for each in borders):
-        lattice = find_lattice(guide)
+        # Copies that cover the seams of a tileable image are not a lattice.
+        lattice = find_lattice(guide, far=False)
         borders = [each and measure_border(guide, axis, lattice) for axis, each in enumerate(borders)]
     rows, columns = (None if each is None else each.figure for each in borders)
     down, across = (None if each is None else (each.start, each.stop) for each in borders)
