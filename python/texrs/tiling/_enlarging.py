@@ -1,7 +1,7 @@
 """Tileable images that are larger than the input.
 
-Several ways are tried at a small size, as in `texrs.design`, and the best one is used. They are large
-patches on a grid, smaller patches where they fit best, and a new arrangement of jointed cells or of stones.
+Several ways are tried at a small size, as in `texrs.design`, and the best one is used. They are large patches on a grid,
+smaller patches where they fit best, and a new arrangement of jointed cells or of stones.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 - "move": patches of copies whose elements moved, as in the paper (sections 3.1 and 3.3).
 - "still": patches of the unchanged exemplar and its mirror images, on a grid.
-- "lattice": the same for an exemplar on a lattice. Patches are in step with the lattice, which is stretched so that
-  whole periods fit a periodic texture.
+- "lattice": the same for an exemplar on a lattice. Patches are in step with the lattice. It is stretched so that whole
+  periods fit a periodic texture.
 - "courses": patches of sheets that are built from the courses of the exemplar.
 - "stitch": patches of the unchanged exemplar, each where it fits best.
 - "cells": bent cells of the exemplar in a new arrangement of its cells, for jointed cells and heaps.
@@ -69,7 +69,7 @@ def list_ways(plan: Plan) -> list[Way]:
 
 
 def find_obstacle(plan: Plan, way: Way) -> str:
-    """Return the reason why an exemplar cannot be laid in a way, or an empty text if it can."""
+    """Return the reason against a way of laying an exemplar, or an empty text if there is none."""
     parts = plan.parts
     found = parts.kind in ("components", "labels")
     if way == "courses" and not parts.courses:
