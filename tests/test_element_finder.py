@@ -12,7 +12,10 @@ import texrs
 from texrs import samples
 from texrs.errors import InvalidInput
 from texrs.exemplar.element_finder import FoundElements, find_elements
+from texrs.exemplar.element_finder._candidates import Candidates, make_leaves, measure
+from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._overlaps import find_overlaps
+from texrs.exemplar.element_finder._selection import join_parts
 
 
 def rate(found: FoundElements, truth: NDArray[np.int32]) -> tuple[float, float]:
@@ -137,6 +140,36 @@ def test_a_stain_is_not_a_joint() -> None:
     f, _ = rate(found, truth)
     assert f >= 0.9
     assert found.layout == "jointed"
+
+
+@pytest.mark.parametrize(("other", "joined"), [("halves", 16), ("notched", 24)])
+def test_touching_parts_are_joined_if_they_form_alike_convex_elements(other: str, joined: int) -> None:
+    # Draw 16 elements of two halves, or 8 single discs and 8 pairs of touching discs.
+    rows, columns = np.mgrid[:240, :240]
+    parts = np.zeros((240, 240), np.int32)
+    for k in range(16):
+        y, x = rows - 30 - k // 4 * 60, columns - 30 - k % 4 * 60
+        if other == "halves":
+            inside = (y / 20) ** 2 + (x / 14) ** 2 < 1
+            parts[inside & (y < 0)], parts[inside & (y >= 0)] = 2 * k + 1, 2 * k + 2
+        elif k % 2:
+            parts[np.hypot(y, x) < 12] = 2 * k + 1
+        else:
+            parts[np.hypot(y + 11, x) < 11.5], parts[np.hypot(y - 11, x) < 11.5] = 2 * k + 1, 2 * k + 2
+    image = np.random.default_rng(4).uniform(0.2, 0.9, (33, 3))[parts].astype(np.float32)
+    borders = (np.diff(parts, axis=0, append=0) != 0) | (np.diff(parts, axis=1, append=0) != 0)
+    leaves = make_leaves(borders.astype(np.float32), find_contours(image, 0), 0.2)
+    # Each part is the region at its most frequent label.
+    votes = np.zeros((leaves.count, 33), int)
+    np.add.at(votes, (leaves.labels, parts), 1)
+    members = np.flatnonzero(votes.argmax(axis=1)).astype(np.uint32)
+    members = members[np.argsort(votes.argmax(axis=1)[members], kind="stable")]
+    _, sizes = np.unique(votes.argmax(axis=1)[members], return_counts=True)
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    elements, quality = join_parts(
+        Candidates(starts, members, *measure(leaves, starts, members)), np.ones(len(sizes)), leaves
+    )
+    assert len(elements) == len(quality) == joined
 
 
 def test_the_upper_one_of_two_discs_is_known() -> None:

@@ -11,7 +11,7 @@ from scipy import ndimage
 from texrs import _rust
 from texrs._progress import ask
 from texrs._typing import Floats
-from texrs.exemplar.element_finder._candidates import Candidates, Leaves, make_candidates, make_leaves
+from texrs.exemplar.element_finder._candidates import Candidates, Leaves, make_candidates, make_leaves, measure
 from texrs.exemplar.element_finder._contour_strength import Contours
 from texrs.exemplar.element_finder._quality import FLOOR, measure_quality
 
@@ -61,6 +61,14 @@ CROSS = ndimage.generate_binary_structure(2, 1)
 """Neighbourhood that elements grow into by one pixel. Without it, the mean F of 141 images is 0.05 lower, the IoU 0.02."""
 STRANGE = -1.0
 """Log-likelihood of a code word below which elements do not grow into its pixels. -1.5 to -0.5 gave the same F and IoU."""
+TOUCH = 0.1
+"""Least share of an outline along which two elements touch that may be parts of one element."""
+PARTS, EVEN, NOTCHED = 1.5, 0.25, 0.02
+"""Least number of parts of an element on average, largest spread of the sizes, and largest loss of convexity.
+
+On 74 images the groups of one steel tread plate pass, with F 0.11 before and 0.93 after. The spread of its sizes is
+0.03. The next ones lose at least 0.08 of convexity.
+"""
 FEWEST = 3, 1
 """Least number of elements of a choice. The second value is used if an image has no choice with the first one."""
 
@@ -155,9 +163,52 @@ def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None
         return None
     score, chosen, quality = best
     picked = np.flatnonzero(chosen)
-    elements = candidates.pick(picked)
     value = measure_value(candidates, quality, chosen)
-    return Choice(grow(elements, leaves, contours), elements, quality[picked], value, score, lines, level, strength)
+    elements, rated = join_parts(candidates.pick(picked), quality[picked], leaves)
+    return Choice(grow(elements, leaves, contours), elements, rated, value, score, lines, level, strength)
+
+
+def join_parts(parts: Candidates, quality: Values, leaves: Leaves) -> tuple[Candidates, Values]:
+    """Return the groups of elements that touch, if they are the more regular elements, and the quality of each.
+
+    The two lit faces of a stud touch each other and nothing else. Their groups are alike in size and as convex as the
+    faces. Whole elements that touch form groups of different sizes, or groups with notches between them.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, f = len(parts), parts.features
+    part = np.full(leaves.count, -1)
+    part[parts.members] = np.repeat(np.arange(count), np.diff(parts.starts))
+    one, other = part[leaves.pairs.astype(np.intp)].T
+    touch = (one >= 0) & (other >= 0) & (one != other)
+    length = coo_array((leaves.arcs[touch, 0], (one[touch], other[touch])), shape=(count, count)).tocoo()
+    length.sum_duplicates()
+    near = length.data > TOUCH * np.minimum(f["length"][length.row], f["length"][length.col])
+    links = coo_array((near[near], (length.row[near], length.col[near])), shape=(count, count))
+    groups, group = connected_components(links, directed=False)
+    if groups < FEWEST[0] or count < PARTS * groups:
+        return parts, quality
+    of_member = group[part[parts.members]]
+    members = parts.members[np.argsort(of_member, kind="stable")]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(of_member, minlength=groups))])
+    features, words = measure(leaves, starts, members)
+    joined = Candidates(starts, members, features | {"seam": np.zeros(groups)}, words)
+
+    def convexity(elements: Candidates) -> float:
+        return float(np.average(elements.features["solid"], weights=elements.features["area"]))
+
+    uneven = measure_spread(joined) > min(measure_spread(parts), EVEN)
+    if uneven or convexity(joined) < convexity(parts) - NOTCHED:
+        return parts, quality
+    rated = np.bincount(group, f["area"] * quality) / np.bincount(group, f["area"])
+    return joined, rated
+
+
+def measure_spread(elements: Candidates) -> float:
+    """Return the spread of the logarithms of the areas of elements inside the image, infinite for fewer than three."""
+    sizes = np.log(elements.features["area"][elements.features["frame"] == 0])
+    return float(np.median(np.abs(sizes - np.median(sizes)))) if len(sizes) >= FEWEST[0] else np.inf
 
 
 def read_strength(contours: Contours, lines: str) -> tuple[Floats, float]:
