@@ -58,6 +58,14 @@ def measure_joints(image: NDArray[Any]) -> tuple[float, int]:
     ), count
 
 
+def test_courses_are_part_of_the_elements() -> None:
+    found = texrs.Exemplar(lay_wall()).elements
+    assert found.courses is not None
+    assert found.lattice is None
+    assert 0.7 < found.courses.confidence < 1
+    assert f"{found.courses}, {found.courses.confidence:.0%} sure" in repr(found)
+
+
 def find(image: NDArray[np.uint8]) -> Any:
     guide = Exemplar(image).guidance
     return find_courses(guide, find_lattice(guide))

@@ -77,6 +77,21 @@ def test_the_parts_of_a_result_agree() -> None:
         assert 0.5 <= overlap.confidence <= 1
 
 
+def test_the_lattice_or_the_courses_are_part_of_the_result() -> None:
+    regular, scattered = (
+        texrs.Exemplar(image.image) for image in (samples.weave((128, 128)), samples.dots((128, 128)))
+    )
+    found = regular.elements
+    assert found.lattice is not None
+    assert 0.9 < found.lattice.confidence < 1
+    assert str(found.lattice) in repr(found)
+    assert found is find_elements(regular.image)
+    assert regular.segment().lattice is found.lattice
+    assert scattered.elements.lattice is scattered.elements.courses is None
+    with pytest.raises(InvalidInput):
+        _ = texrs.Exemplar(np.zeros((20, 20, 20)), axes=3).elements
+
+
 def test_threads_do_not_change_a_result() -> None:
     image = samples.pebbles((160, 120)).image
     results = []

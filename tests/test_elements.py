@@ -180,6 +180,13 @@ def test_the_elements_are_those_of_the_finder() -> None:
     )
 
 
+def test_the_report_contains_the_lattice() -> None:
+    found = analyse(samples.weave((128, 128)).image)
+    assert "lattice of periods" in found.report["lattice"]["description"]
+    assert f"found, {found.report['lattice']['confidence']:.0%} sure" in elements.to_html(found)
+    assert "lattice" not in analyse(samples.dots((128, 128)).image).report
+
+
 @pytest.mark.parametrize("layout", ["jointed", "connected"])
 def test_a_given_layout_replaces_the_one_that_is_found(layout: str) -> None:
     found, plain = analyse(IMAGE, layout=layout), analyse(IMAGE)

@@ -262,6 +262,9 @@ def explain(entry: Any, *, quiet: bool) -> None:
     for name in entry.report["proposed"]:
         value = {"box": show_box(entry.report["box"]), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
+    for name in ("lattice", "courses"):
+        if known := entry.report.get(name):
+            note(f"found {known['description']} ({known['confidence']:.0%} sure)", quiet=quiet)
     note(f"elements: {entry.arrangement.describe(entry.layout)}", quiet=quiet)
     for doubt in entry.report.get("warnings", ()):
         note(f"doubtful: {doubt}", quiet=quiet)

@@ -53,8 +53,9 @@ def analyse(
     """Find the elements of a texture, their pixels and their layout [1]_.
 
     All arguments except the image are optional. The elements are those of `texrs.exemplar.element_finder`, which DESIGN
-    uses as well. The report contains the confidence of the layout and of the elements. The layout of a heap is
-    "disjoint", and the report's ``"found"`` is "heap". If ``layout`` or ``background`` is given, it replaces what was
+    uses as well. The report contains the confidence of the layout and of the elements. It also contains the
+    ``"lattice"`` or the ``"courses"`` of the image, if any, with their confidence. The layout of a heap is "disjoint",
+    and the report's ``"found"`` is "heap". If ``layout`` or ``background`` is given, it replaces what was
     found. With a ``box``, the elements like the one in the box remain. If no element has the size of the box, the
     elements are the places that look like the box. The same applies if a ``mask`` or a ``search`` is given.
 
@@ -165,7 +166,10 @@ def _take_view(pixels: Array, given: Arguments, view: View, how: Settings) -> El
     parted = Separation(view.points, view.confidence, np.arange(len(view.points)), view.mask, "finder")
     _check(given, start, how)
     entry = _make_entry(pixels, given, start, found, parted, how)
-    report = entry.report if given.layout is not None else {**entry.report, "found": view.found}
+    report = entry.report if given.layout is not None else {**entry.report, "found": view.found.layout}
+    for name, kept in (("lattice", view.found.lattice), ("courses", view.found.courses)):
+        if kept is not None:
+            report[name] = {"description": str(kept), "confidence": kept.confidence}
     return replace(entry, known=view.labels, report=report)
 
 

@@ -26,7 +26,7 @@ from texrs.elements._separation import label_components, rank_pieces
 from texrs.exemplar.shapes import mark_outlines
 
 if TYPE_CHECKING:
-    from texrs.exemplar.element_finder import Arrangement
+    from texrs.exemplar.element_finder import Arrangement, FoundElements
 
 __all__ = ["FEWEST", "View", "choose_layout", "view_elements"]
 
@@ -60,11 +60,11 @@ CUT = 0.5
 
 
 class _Found(NamedTuple):
-    """Element of each pixel, (H, W) from 1, confidence of each element, (n,), and probability of each layout."""
+    """Element of each pixel, (H, W) from 1, confidence of each element, (n,), and all that the finder found."""
 
     labels: Labels
     confidence: NDArray[np.float64]
-    layouts: dict[Arrangement, float]
+    whole: FoundElements
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,8 +87,8 @@ class View:
         Layout of the elements.
     sure : float
         Probability that the layout is right.
-    found : {"separate", "heap", "jointed", "net", "none"}
-        Layout that the finder found.
+    found : FoundElements
+        All that the finder found.
 
     """
 
@@ -99,13 +99,13 @@ class View:
     box: Box
     layout: Layout
     sure: float
-    found: Arrangement
+    found: FoundElements
 
 
 def view_elements(guide: Floats, given: Arguments, wrap: Wrap, seed: int, progress: Progress) -> View | None:
     """Return the elements that the finder finds, or None if they are too few or do not fit the given box."""
     found = _find(guide, wrap, seed, progress)
-    layout, sure = (given.layout, 1.0) if given.layout is not None else choose_layout(found.layouts)
+    layout, sure = (given.layout, 1.0) if given.layout is not None else choose_layout(found.whole.layouts)
     labels, confidence = found.labels, found.confidence
     if given.background is not None and layout != Layout.CONNECTED:
         labels, confidence = _remove_hit(labels, confidence, given.background)
@@ -123,8 +123,7 @@ def view_elements(guide: Floats, given: Arguments, wrap: Wrap, seed: int, progre
     box = given.box or _choose_box(labels)
     points = measure_centres(labels, wrap)[:count]
     mask = ~inside if layout == Layout.CONNECTED else inside
-    name = max(found.layouts, key=lambda name: found.layouts[name])
-    return View(labels, points, confidence[:count], mask, box, layout, sure, name)
+    return View(labels, points, confidence[:count], mask, box, layout, sure, found.whole)
 
 
 def choose_layout(layouts: dict[Arrangement, float]) -> tuple[Layout, float]:
@@ -146,7 +145,7 @@ def _find(guide: Floats, wrap: Wrap, seed: int, progress: Progress) -> _Found:
     found = find_elements(around, seed=seed, progress=lambda stage, share: progress("propose", share))
     sure = np.array([element.confidence for element in found.elements])
     if not any(margin):
-        return _Found(*_keep(found.labels, sure, np.flatnonzero([e.area > 0 for e in found.elements])), found.layouts)
+        return _Found(*_keep(found.labels, sure, np.flatnonzero([e.area > 0 for e in found.elements])), found)
     # Wrap the elements into the image, and drop the second copies of elements at the border.
     size = np.array(guide.shape[:2])
     places = np.array([element.centre for element in found.elements]).reshape(-1, 2) - margin
@@ -158,7 +157,7 @@ def _find(guide: Floats, wrap: Wrap, seed: int, progress: Progress) -> _Found:
         if free.sum() > len(free) / 2:
             kept.append(k)
             labels[at] = np.where(free, len(kept), labels[at])
-    return _Found(labels, sure[kept], found.layouts)
+    return _Found(labels, sure[kept], found)
 
 
 def _keep(

@@ -54,6 +54,9 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
         advice = f"; {escape(ADVICE[name])}" if sure is not None and sure < DOUBTFUL else ""
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
+    for name in ("lattice", "courses"):
+        if known := report.get(name):
+            rows.append(f"<tr><th>{name}<td>{escape(known['description'])}<td>found, {known['confidence']:.0%} sure")
     doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("warnings", []))
     # The script of the page derives the list of corrections from these data.
     known = {

@@ -47,6 +47,7 @@ from texrs.exemplar.symmetry import Flip, find_mirrors
 from texrs.io import _origins
 
 if TYPE_CHECKING:
+    from texrs.exemplar.element_finder import FoundElements
     from texrs.io import Header
 
 T = TypeVar("T")
@@ -278,6 +279,29 @@ class Exemplar:
             ("similarity", coarsest, number, k, n, numbers),
             lambda: find_similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
         )
+
+    @property
+    def elements(self) -> FoundElements:
+        """The elements of an image, their layout, and their lattice or courses, each with a confidence.
+
+        All functions that need elements use this result.
+
+        Raises
+        ------
+        InvalidInput
+            If the exemplar is a volume.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.Exemplar(texrs.samples.weave((128, 128)).image).elements.layout
+        'jointed'
+
+        """
+        # Import the finder only here, because it imports SciPy.
+        from texrs.exemplar.element_finder import find_elements
+
+        return self.cached("elements", lambda: find_elements(self._pixels))
 
     @property
     def instances(self) -> Instances | None:

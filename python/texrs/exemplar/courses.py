@@ -22,13 +22,14 @@ from texrs.exemplar.regularity import (
     bend,
     correlate,
     crop_light,
+    find_lattice,
     level_light,
 )
 from texrs.exemplar.shapes import widen
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
 
-__all__ = ["Courses", "find_courses"]
+__all__ = ["Courses", "find_courses", "find_regularity"]
 
 STRIPS = 24
 """Number of strips, across the courses, into which an image is divided for comparison."""
@@ -39,6 +40,11 @@ AGREE = 0.6
 """Minimum share of the brightness gradient across courses that is common to all strips.
 
 Textures without courses have 0.05 to 0.25, denim 0.46, walls 0.9.
+"""
+CERTAIN = -2.9, 7.7
+"""Weights of a constant and of this share in the log odds of the confidence.
+
+A logistic regression on courses of photographs, generated samples and their parts, with shares from 0.3: 80 right, 46 wrong.
 """
 CLEAR = 0.4
 """Minimum strength of a joint relative to the strongest joints.
@@ -68,12 +74,15 @@ class Courses:
         Slope of the courses, in pixels along `axis` per pixel along the other axis.
     joints : tuple of float
         Positions of the joints between courses, in pixels along `axis`, after levelling the exemplar.
+    confidence : float
+        Probability that the exemplar has courses, 0 to 1. 1 for courses that were not measured.
 
     """
 
     axis: int
     slope: float
     joints: tuple[float, ...]
+    confidence: float = 1.0
 
     __repr__ = brief
 
@@ -103,6 +112,13 @@ def turn(slope: float, axis: int) -> NDArray[np.float64]:
     return np.rint(np.array([[cosine, -sine], [sine, cosine]]) * FRACTIONS) / FRACTIONS
 
 
+def find_regularity(guide: Floats) -> tuple[Lattice | None, Courses | None]:
+    """Find the lattice or the courses of an image. Elements in courses do not repeat, so there is never both."""
+    lattice = find_lattice(guide)
+    courses = find_courses(guide, lattice)
+    return None if courses else lattice, courses
+
+
 def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
     """Find the courses of an image. None if there are none, or if the elements are on a lattice."""
     if min(guide.shape[:2]) < STRIPS * 2:
@@ -118,7 +134,8 @@ def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
     joints = find_joints(light if axis == 0 else light.T)
     if len(joints) <= FEWEST or (lattice is not None and repeats(lattice, courses, level)):
         return None
-    return Courses(axis, slope, joints)
+    odds = CERTAIN[0] + CERTAIN[1] * agreement
+    return replace(courses, joints=joints, confidence=round(1 / (1 + float(np.exp(-odds))), 3))
 
 
 def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

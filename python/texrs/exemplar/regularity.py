@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,13 @@ If the ratio is larger, the peak is part of a stripe and does not give a period.
 """
 NEAR = 2
 """Search distance around the expected multiple of a period, in pixels."""
+CERTAIN = -8.1, 9.3, 1.5
+"""Weights of a constant, the correlation and the logarithm of the number of cells in the log odds of the confidence.
+
+A logistic regression on 464 lattices of photographs, generated samples and their parts: 386 right, 78 wrong. It was
+also fitted on each half of the images. On the other half, 72 % to 100 % of the lattices stated as 80 % to 95 % sure are
+right. Above 95 %, 93 % to 98 % are right.
+"""
 OFTEN = 64
 """Number of nearest peaks to which periods are fitted peak by peak.
 
@@ -97,6 +104,8 @@ class Lattice:
         Mean autocorrelation of the image over the lattice, -1 to 1.
     exact : ((float, float), (float, float)), optional
         The vectors to a fraction of a pixel, fitted to the positions of their multiples.
+    confidence : float
+        Probability that the image repeats in this way, 0 to 1. 1 for a lattice that was not measured.
 
     Examples
     --------
@@ -112,6 +121,8 @@ class Lattice:
     """Mean autocorrelation of the image over the lattice, -1 to 1."""
     exact: tuple[tuple[float, float], tuple[float, float]] | None = None
     """The vectors to a fraction of a pixel, fitted to the positions of their multiples."""
+    confidence: float = 1.0
+    """Probability that the image repeats in this way, 0 to 1. 1 for a lattice that was not measured."""
 
     __repr__ = brief
 
@@ -205,7 +216,7 @@ def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
     """Return the lattice of an image whose sides are multiplied by a factor."""
     exact = (factor * lattice.vectors.T).tolist()
     a, b = ((round(row), round(column)) for row, column in exact)
-    return Lattice(a, b, lattice.correlation, (tuple(exact[0]), tuple(exact[1])))
+    return replace(lattice, a=a, b=b, exact=(tuple(exact[0]), tuple(exact[1])))
 
 
 def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
@@ -320,10 +331,12 @@ def _fit_lattice(correlation: Floats, shape: tuple[int, ...], least: float, chan
         return None
     best = max(mean for mean, _ in found.values())
     good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= BETTER * best]
-    _, (first, second), mean = min(good)
+    cell, (first, second), mean = min(good)
     if mean < least:
         return None
-    return Lattice(first, second, mean, _refine(correlation, first, second))
+    odds = CERTAIN[0] + CERTAIN[1] * mean + CERTAIN[2] * float(np.log(shape[0] * shape[1] / cell))
+    sure = round(1 / (1 + float(np.exp(-odds))), 3)
+    return Lattice(first, second, mean, _refine(correlation, first, second), sure)
 
 
 def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -21,9 +21,9 @@ from texrs._progress import answering, ask, listen
 from texrs._show import brief
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
-from texrs.exemplar.courses import Courses, find_courses
+from texrs.exemplar.courses import Courses, find_regularity
 from texrs.exemplar.layers import Regions
-from texrs.exemplar.regularity import Lattice, find_lattice, scale_lattice
+from texrs.exemplar.regularity import Lattice, scale_lattice
 from texrs.exemplar.shapes import mark_outlines
 
 if TYPE_CHECKING:
@@ -277,18 +277,14 @@ def segment(
     if options.segmentation == "none" or options.layers is not None:
         whole = Regions.of(rgb, watch).layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
-    lattice = find_lattice(rgb)
-    watch()
-    courses = find_courses(rgb, lattice)
-    lattice = None if courses else lattice
-    watch()
-    reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
-    if options.segmentation != "grid":
-        # Import the finder only here, because it imports SciPy.
-        from texrs.exemplar.element_finder import find_elements
+    # Import the finder only here, because it imports SciPy.
+    from texrs.exemplar.element_finder import find_elements
 
-        with answering(watch):
-            found = find_elements(rgb)
+    with answering(watch):
+        found = None if options.segmentation == "grid" else find_elements(rgb)
+        lattice, courses = find_regularity(rgb) if found is None else (found.lattice, found.courses)
+    reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
+    if found is not None:
         fault = find_fault(found)
         if options.segmentation == "components" or not fault:
             layers = (found.labels > 0).astype(np.int32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -12,11 +12,13 @@ from texrs._arrays import as_image, as_rgb, as_seed, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._progress import answering, ask, listen
 from texrs._typing import Bools, Floats, Labels, Progress
+from texrs.exemplar.courses import Courses, find_regularity
 from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._layout_class import LAYOUTS, Arrangement, read_layout
 from texrs.exemplar.element_finder._outline_cuts import enlarge, refine_outlines
 from texrs.exemplar.element_finder._overlaps import Overlap, find_overlaps
 from texrs.exemplar.element_finder._selection import Choice, choose, drop_doubtful
+from texrs.exemplar.regularity import Lattice
 
 WORK = 200, 360
 """Least and largest length of the longer side of the reduced image, in pixels."""
@@ -88,6 +90,10 @@ class FoundElements:
         Probability of each layout.
     overlaps : tuple of Overlap
         Overlapping pairs of elements of a heap, each with the upper and the lower element.
+    lattice : Lattice, optional
+        Lattice of the image, if any, with its ``confidence``. The elements need not be on it one by one.
+    courses : Courses, optional
+        Courses of the image, if any, with their ``confidence``. `lattice` is None in this case.
 
     """
 
@@ -97,6 +103,15 @@ class FoundElements:
     confidence: float
     layouts: dict[Arrangement, float]
     overlaps: tuple[Overlap, ...] = ()
+    lattice: Lattice | None = None
+    courses: Courses | None = None
+
+    def __repr__(self) -> str:
+        """Return the number of elements, the layout, and the lattice or courses, with their confidence."""
+        rows, columns = self.labels.shape
+        kept = [f", {each}, {each.confidence:.0%} sure" for each in (self.lattice, self.courses) if each is not None]
+        found = f"{len(self.elements)} in {rows} x {columns}, {self.layout}, {self.confidence:.0%} sure"
+        return f"FoundElements({found}{''.join(kept)})"
 
     @property
     def background(self) -> Bools:
@@ -113,7 +128,7 @@ _FOUND: Cache[bytes, FoundElements] = Cache(1 << 26, lambda found: found.labels.
 
 
 def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | None = None) -> FoundElements:
-    """Find the elements that an image repeats, and their layout.
+    """Find the elements that an image repeats, their layout, and their lattice or courses.
 
     Recent results are cached by the colours of the image.
 
@@ -130,7 +145,7 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     Returns
     -------
     FoundElements
-        ``labels``, ``elements``, ``layout`` and their confidences. The labels are read-only.
+        ``labels``, ``elements``, ``layout``, ``lattice``, ``courses`` and their confidences. The labels are read-only.
 
     Raises
     ------
@@ -142,8 +157,8 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     >>> from texrs import samples
     >>> from texrs.exemplar.element_finder import find_elements
     >>> found = find_elements(samples.dots((128, 128)).image)
-    >>> found.layout
-    'separate'
+    >>> found.layout, found.lattice
+    ('separate', None)
 
     """
     pixels, seed, progress = as_image(image, "image"), as_seed(seed), listen(progress)
@@ -159,6 +174,13 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
 
 def analyse(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundElements:
     """Find the elements of an image (H, W, 3) in [0, 1]. `watch` is called with the finished share of the work."""
+    with answering(watch, 0.0):
+        lattice, courses = find_regularity(rgb)
+    return replace(read_elements(rgb, seed, watch), lattice=lattice, courses=courses)
+
+
+def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundElements:
+    """Find the elements of an image and their layout, without its lattice and its courses."""
     small = reduce(rgb)
     if min(small.shape[:2]) < LEAST or float(np.ptp(small)) == 0:
         return report_nothing(rgb.shape[0], rgb.shape[1])
