@@ -103,17 +103,8 @@ LEFT = {
     "texrs.volume.Classes.of.image",
     "texrs.volume.Classes.shares.image",
     "texrs.Plane.project.points",
-    "texrs.Material.get.key",
-    "texrs.Material.__contains__.key",
-    "texrs.Material.__getitem__.name",
-    "texrs.kernels.mean_shift.mean_shift.progress",
-    "texrs.kernels.regions.felzenszwalb.progress",
 }
-"""Arguments with known exceptions. A view of two bytes as an array of 8 GB ends in a MemoryError.
-
-`int` as progress callback raises its own error. Unknown or unhashable keys of a material, which is a mapping, raise a
-KeyError or TypeError. No new ones may be added.
-"""
+"""Arguments with known exceptions. A view of two bytes as an array of 8 GB ends in a MemoryError. Add no new ones."""
 
 
 def list_left(name, wrong):

@@ -226,7 +226,7 @@ def as_progress(value: object, name: str = "progress", *, stages: bool = False) 
     """Check a progress function. It is called with the completed share, or with stage and share if ``stages``."""
     if value is None:
         return None
-    if not callable(value):
+    if not callable(value) or isinstance(value, type):
         raise InvalidInput(f"{name}: must be a function or None, got {value!r}")
     check_call(value, name, *(("stage", "share") if stages else ("share",)))
     return value

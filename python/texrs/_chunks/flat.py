@@ -131,7 +131,7 @@ def check_suffix(path: Path, axes: int, channel: Channel, chunk: Sequence[int]) 
         If the format cannot store the dtype or the channels.
 
     """
-    place = FilePath(os.fspath(path))
+    place = as_path(path)
     suffix = find_suffix(place).lower()
     if suffix == RAW:
         if channel.dtype == np.float16:

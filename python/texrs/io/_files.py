@@ -28,6 +28,8 @@ def as_path(path: PathLike) -> Path:
     """Return the argument as a `pathlib.Path`, or raise an error if it is not a path."""
     if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
         raise InvalidInput(f"path: must be a str or a pathlib.Path, got {type(path).__name__}")
+    if not os.fspath(path):
+        raise FileError("'': must be the name of a file or folder")
     if "\0" in os.fspath(path):
         raise FileError(f"{os.fspath(path)!r}: must not contain the null character")
     if any(len(os.fsencode(part)) > _LONGEST for part in Path(path).parts):

@@ -16,7 +16,7 @@ from texrs._checks import as_limit, check_memory
 from texrs._notices import ignore
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
-from texrs.errors import FileError, LimitExceeded
+from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io._files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
 from texrs.io._texts import MEMBER
 
@@ -173,6 +173,8 @@ def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | No
 
     """
     place, limit = as_path(path), as_limit(limit)
+    if choose is not None and not callable(choose):
+        raise InvalidInput(f"choose: must be a function or None, got {choose!r}")
     with _open_archive(place) as archive:
         members = _find_members(place, archive)
         headers = {name: header for name, (_, header) in members.items()}

@@ -14,13 +14,13 @@ import numpy as np
 
 from texrs import io
 from texrs._alpha import divide, has_alpha, multiply
-from texrs._checks import as_instance
+from texrs._checks import as_choice
 from texrs._notices import assume, ignore
 from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._files import as_path, find_suffix
-from texrs.io._formats import FORMATS, READ, READ_IMAGES, READ_VOLUMES
+from texrs.io._formats import FORMATS, READ, READ_IMAGES, READ_VOLUMES, STORE, WRITTEN_IMAGES, WRITTEN_VOLUMES
 from texrs.materials._conventions import guess_roles, report_guesses
 from texrs.materials._converting import choose_dtype, convert
 from texrs.materials._labels import REASON, holds_labels
@@ -254,7 +254,8 @@ def write_maps(
         if needed.exists() and not needed.is_dir():
             raise FileError(f"{needed}: must be a folder")
     if suffix is not None:
-        as_instance(suffix, "suffix", str)
+        known = WRITTEN_IMAGES if axes == 2 else (*WRITTEN_VOLUMES, STORE)
+        as_choice(suffix.lower() if isinstance(suffix, str) else suffix, "suffix", known)
     endings = {name: suffix or choose_suffix(each, depth, axes) for name, each in maps.items()}
     write = io.write if axes == 2 else io.write_volume
     files: list[FilePath] = []

@@ -58,7 +58,9 @@ def holds_labels(pixels: Array, axes: int) -> bool:
         Number of spatial axes: 2 for images, 3 for volumes.
 
     """
-    if pixels.dtype.kind not in "ui" or pixels.shape[axes:] not in ((), (1,)) or min(pixels.shape[:axes]) < 2:
+    if pixels.dtype.kind not in "ui" or pixels.ndim < axes or pixels.shape[axes:] not in ((), (1,)):
+        return False
+    if min(pixels.shape[:axes]) < 2:
         return False
     sides = [min(n, int(LARGEST ** (1 / axes))) for n in pixels.shape[:axes]]
     middle = tuple(slice((n - m) // 2, (n - m) // 2 + m) for n, m in zip(pixels.shape, sides, strict=False))

@@ -45,6 +45,12 @@ SHOWN = 512
 """Maximum length of the longer side of previews in notebooks, in pixels."""
 
 
+class MissingMap(InvalidInput, KeyError):
+    """A material has no map of a name. Methods of `Mapping`, such as ``get``, look for a KeyError."""
+
+    __str__ = Exception.__str__  # A KeyError shows its message in quotes.
+
+
 class Material(Exports):
     """Maps of one surface by name, such as albedo, normals and heights, aligned pixel by pixel.
 
@@ -240,7 +246,10 @@ class Material(Exports):
 
     def __getitem__(self, name: str) -> Map:
         """Return a map by its name."""
-        return self._maps[name]
+        try:
+            return self._maps[name]
+        except (KeyError, TypeError):
+            raise MissingMap(f"name: must be one of {', '.join(self._maps)}; got {name!r}") from None
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the maps."""

@@ -16,6 +16,7 @@ from texrs._progress import answering, ask, listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
+from texrs.io._files import as_path
 from texrs.kernels.gather import gather
 from texrs.volume._values import as_direction
 
@@ -273,7 +274,7 @@ def turntable(
     from PIL import Image
 
     count, side, above, period = check_turntable(frames, size, elevation, seconds)
-    if not str(path).lower().endswith(".gif"):
+    if as_path(path).suffix.lower() != ".gif":
         raise FileError(f"{path}: the suffix must be .gif")
     shade = as_tuple(background, "background", 3, "three integers")
     ground = np.array([as_int(b, "background", 0, 255) for b in shade], np.float32)

@@ -11,6 +11,7 @@ from texrs._typing import Path
 from texrs._viewer import as_page
 from texrs.errors import FileError
 from texrs.io import atomic
+from texrs.io._files import as_path
 from texrs.volume.labels import label_to_color
 
 __all__ = ["Viewer"]
@@ -87,7 +88,7 @@ class Viewer:
         True
 
         """
-        if not str(path).lower().endswith((".html", ".htm")):
+        if as_path(path).suffix.lower() not in (".html", ".htm"):
             raise FileError(f"{path}: the suffix must be .html")
         head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>A volume</title>\n<body>\n'
         with atomic(path, overwrite=overwrite) as temporary:
