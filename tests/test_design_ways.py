@@ -126,6 +126,21 @@ def test_a_way_that_an_exemplar_does_not_allow_is_refused(way, reason):
         texrs.design(noise, 64, way=way)
 
 
+def test_a_size_that_a_lattice_does_not_fit_is_refused_with_one_that_it_fits():
+    tile = np.random.default_rng(3).integers(0, 255, (40, 44, 3), np.uint8)
+    ornament = np.tile(tile, (4, 4, 1))
+    with pytest.raises(InvalidInput, match="but they fit 80 rows and 176 columns"):
+        texrs.design(ornament, (60, 176), way="lattice")
+    for way in ("still", "auto"):
+        made = texrs.design(ornament, (60, 176), way=way, copies=1)
+        assert made.report["way"] != ["lattice"]
+        [refused] = made.report["refused"]
+        assert "but they fit 80 rows and 176 columns" in refused["lattice"]
+    made = texrs.design(ornament, (80, 176), copies=1)
+    assert made.report["way"] == ["lattice"]
+    assert "lattice" not in made.report["refused"][0]
+
+
 def test_cells_need_room():
     sample = samples.pebbles((128, 128))
     with pytest.raises(InvalidInput, match="^size: must be at least 1.4 times as large as the largest cell"):

@@ -245,6 +245,60 @@ def test_a_lattice_that_would_be_bent_too_far_does_not_close():
     assert lattice.close((60, 400), (True, True)) is None
     assert lattice.close((20, 400), (True, True)) is None
     assert lattice.close((60, 400), (False, True)) is not None
+    assert lattice.find_size((60, 400), (True, True)) == (80, 400)
+    assert lattice.find_size((60, 400), (False, True)) == (60, 400)
+    assert "80 rows and 400 columns" in lattice.explain((60, 400), (True, True))
+
+
+def turn(degrees):
+    return np.array([[np.cos(a := np.radians(degrees)), -np.sin(a)], [np.sin(a), np.cos(a)]])
+
+
+def measure_shear(change):
+    return abs(change[:, 0] @ change[:, 1]) / np.prod(np.linalg.norm(change, axis=0))
+
+
+def test_a_lattice_closes_with_little_shear():
+    """An odd number of courses of a running bond fits best, but it would shear the wall by 12 %."""
+    wall = Lattice((20, 30), (20, -30), 0.9)
+    closing = wall.close((260, 240), (True, True))
+    np.testing.assert_allclose(closing, [[260 / 280, 0], [0, 1]], atol=1e-5)
+    rng = np.random.default_rng(0)
+    accepted = 0
+    for _ in range(200):
+        vectors = turn(rng.uniform(0, 60)) @ [[1, 0], [rng.uniform(-0.1, 0.1), 1]] @ np.diag(rng.uniform(20, 60, 2))
+        exact = tuple(map(tuple, np.rint(vectors.T * 256) / 256))
+        lattice = Lattice((1, 0), (0, 1), 0.9, exact)
+        size = tuple(rng.integers(180, 500, 2).tolist())
+        closing = lattice.close(size, (True, True))
+        other = lattice.find_size(size, (True, True))
+        assert other is not None
+        assert lattice.close(other, (True, True)) is not None
+        if closing is None:
+            assert other != size
+            continue
+        accepted += 1
+        times = np.linalg.solve(closing @ lattice.vectors, np.diag(size))
+        assert np.abs(times - np.rint(times)).max() < 1e-3
+        stretch = np.linalg.svd(closing, compute_uv=False)
+        assert 1 / 1.1501 < stretch.min() <= stretch.max() < 1.1501
+        assert measure_shear(closing) < 0.0401
+    assert accepted > 150
+
+
+def test_a_lattice_that_closes_along_one_axis_is_not_sheared():
+    """A wall that was photographed obliquely becomes level."""
+    vectors = turn(3) @ [[20.0, 0.0], [30.0, 60.0]]
+    lattice = Lattice((20, 30), (0, 60), 0.9, tuple(map(tuple, vectors.T)))
+    closing = lattice.close((123, 240), (False, True))
+    np.testing.assert_allclose(closing, turn(-3), atol=1e-5)
+    closing = lattice.close((200, 123), (True, False))
+    np.testing.assert_allclose(closing, turn(-3), atol=1e-5)
+
+
+def test_parallel_vectors_are_not_a_lattice():
+    with pytest.raises(InvalidInput, match="^lattice: must have two vectors that are not parallel"):
+        Lattice((0, 8), (0, 16), 1.0).close((32, 32), (True, True))
 
 
 def test_direction_sees_one_direction_and_two_at_right_angles():

@@ -159,9 +159,17 @@ def test_a_lattice_closes_at_sizes_larger_than_the_picture():
     image = np.tile((unit - unit.min()) / np.ptp(unit), (5, 4))[:160, :170].astype(np.float32)
     made = texrs.tile(image, size=(205, 285))
     assert made.report["method"] == "quilt"
+    assert (made.report["way"], made.report["refused"]) == ("lattice", {})
     # Five periods fit the result along each axis, so they are 41 and 57 pixels long.
     off = np.abs(made.image - np.roll(made.image, (41, 57), (0, 1))).mean()
     assert off < 0.15 * made.image.std(), off / made.image.std()
+
+
+def test_a_lattice_that_would_change_too_much_is_not_closed():
+    tile = np.random.default_rng(3).integers(0, 255, (60, 60, 3), np.uint8)
+    made = texrs.tile(np.tile(tile, (4, 4, 1)), size=(250, 90))
+    assert made.report["way"] in ("still", "stitch")
+    assert "but they fit " in made.report["refused"]["lattice"]
 
 
 def test_a_seam_that_closes_costs_no_more_than_the_least_one_but_for_little():

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from texrs._show import brief
 from texrs._typing import Floats
+from texrs.exemplar.closing import FRACTIONS
 from texrs.exemplar.regularity import (
-    FRACTIONS,
     REACH,
     WINDOW,
     Lattice,

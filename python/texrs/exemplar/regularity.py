@@ -11,11 +11,12 @@ from texrs._arrays import as_float, as_int, as_tuple, as_wrap, hypot_single
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.exemplar.closing import FRACTIONS, close_vectors, find_size
 from texrs.exemplar.shapes import widen
 from texrs.source_map import SourceMap
 
 __all__ = [
-    "FRACTIONS",
     "WINDOW",
     "Lattice",
     "bend",
@@ -71,13 +72,8 @@ OFTEN = 64
 
 Farther out, periods are fitted once per ring of peaks.
 """
-BENT = 0.15
-"""Maximum stretch or shear of an image to fit whole periods of its lattice."""
-PARTS, FRACTIONS = 2.0**8, 2.0**20
-"""Numbers of steps for rounding periods (per pixel) and matrices (per unit).
-
-Results are then the same on every processor.
-"""
+PARTS = 2.0**8
+"""Number of steps per pixel for rounding periods. Results are then the same on every processor."""
 FARTHEST = 4096.0
 """Maximum length of listed shifts, in pixels."""
 LEANS = 3.0
@@ -173,7 +169,8 @@ class Lattice:
 
         The result is a matrix that acts on (row, column). After the change, the height and the width are lattice
         translations, along the axes that wrap. Courses and joints that end at one side of a tileable texture then
-        continue on the other side.
+        continue on the other side. Neighbouring numbers of periods are tried, and those with the smallest stretch,
+        shear and rotation are used.
 
         Parameters
         ----------
@@ -185,11 +182,11 @@ class Lattice:
         Returns
         -------
         (2, 2) float64, or None
-            None if the lattice would have to be stretched or sheared by more than 0.15.
+            None if a stretch above 15 %, a shear above 4 % or a rotation above 8.5 degrees is necessary.
 
         Raises
         ------
-        numpy.linalg.LinAlgError
+        InvalidInput
             The vectors are parallel.
 
         Examples
@@ -199,17 +196,72 @@ class Lattice:
         [[1.0, 0.0], [0.0, 1.0]]
 
         """
-        vectors = self.vectors
+        return close_vectors(*self._check(size, wrap))
+
+    def find_size(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> tuple[int, int] | None:
+        """Return the size nearest to a given one into which whole periods fit almost unchanged.
+
+        Parameters
+        ----------
+        size : (rows, columns)
+            Size of the tileable texture, in pixels.
+        wrap : (bool, bool)
+            Axes along which the texture must be tileable.
+
+        Returns
+        -------
+        (int, int), or None
+            Rows and columns in pixels, at most three periods away. None if `close` returns None for all such sizes.
+
+        Raises
+        ------
+        InvalidInput
+            The vectors are parallel.
+
+        Examples
+        --------
+        >>> from texrs.exemplar import Lattice
+        >>> Lattice((0, 40), (40, 0), 1.0).find_size((60, 400), (True, True))
+        (80, 400)
+
+        """
+        return find_size(*self._check(size, wrap))
+
+    def explain(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> str:
+        """Return a sentence for reports: why a size does not fit the lattice, and which size near it does.
+
+        Parameters
+        ----------
+        size : (rows, columns)
+            Size of the tileable texture, in pixels.
+        wrap : (bool, bool)
+            Axes along which the texture must be tileable.
+
+        Returns
+        -------
+        str
+            The sentence, as part of a longer one.
+
+        Examples
+        --------
+        >>> from texrs.exemplar import Lattice
+        >>> Lattice((0, 40), (40, 0), 1.0).explain((60, 400), (True, True))
+        'whole periods of its lattice do not fit 60 rows and 400 columns, but they fit 80 rows and 400 columns'
+
+        """
+        other = self.find_size(size, wrap)
+        fits = f", but they fit {other[0]} rows and {other[1]} columns" if other else ", or sizes near them"
+        return f"whole periods of its lattice do not fit {size[0]} rows and {size[1]} columns{fits}"
+
+    def _check(
+        self, size: tuple[int, int], wrap: tuple[bool, bool]
+    ) -> tuple[NDArray[np.float64], list[int], tuple[bool, ...]]:
+        """Return the vectors and the checked arguments of a search for a fitting size."""
         lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
-        cyclic = as_wrap(wrap)
-        sides = np.diag(np.array(lengths, np.float64))
-        # Find the lattice translation that is nearest to each side of the texture.
-        nearest = np.where(cyclic, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
-        if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
-            return None
-        # Add 0 to convert negative zeros.
-        turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS + 0.0
-        return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
+        vectors = self.vectors
+        if vectors[0, 0] * vectors[1, 1] == vectors[0, 1] * vectors[1, 0]:
+            raise InvalidInput(f"lattice: must have two vectors that are not parallel, got {self.a} and {self.b}")
+        return vectors, lengths, as_wrap(wrap)
 
 
 def scale_lattice(lattice: Lattice, factor: float) -> Lattice:

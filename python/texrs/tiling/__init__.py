@@ -57,7 +57,7 @@ from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling._borders import SEEN
 from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
-from texrs.tiling._enlarging import enlarge
+from texrs.tiling._enlarging import enlarge, find_obstacle
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
@@ -116,9 +116,9 @@ def tile(
         Axes along which the result repeats. Default: both.
     size : int or (rows, columns), optional
         Size of the result in pixels, at least 2 along an axis that wraps. A larger result is stitched from patches of
-        the image, which must have at least 8 pixels a side. A lattice is then stretched so that it closes. If the
-        default size is smaller than the image, the report contains the reason. Default: the size of the image, or less
-        along an axis if the joint is then clearly less visible.
+        the image, which must have at least 8 pixels a side. A lattice is then stretched so that it closes, if this
+        changes it little. If the default size is smaller than the image, the report contains the reason. Default: the
+        size of the image, or less along an axis if the joint is then clearly less visible.
     overlap : int or (rows, columns), optional
         Overlap of two opposite edges in pixels, from 1 to half the side. It cannot be combined with ``size``. Default:
         the overlap with the least visible joint.
@@ -150,6 +150,7 @@ def tile(
 
         - ``method``: "tile", or "quilt" if the result is larger than the image.
         - ``way``: Way that a larger result was laid in, as in `texrs.design`: "still", "lattice", "stitch" or "cells".
+        - ``refused``: For a larger result, the reason against the way "lattice", if there is one.
         - ``candidates``: For a larger result, the figures of each way that was tried, or None.
         - ``size``: (rows, columns).
         - ``wrap``: (rows, columns): whether the result repeats along each axis.
@@ -266,8 +267,9 @@ def _join_edges(
     reasons: dict[str, str] = {}
     elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
     # A larger result is a quilt of patches. Otherwise join the ends of the image.
-    way, tried = None, None
+    way, tried, obstacle = None, None, ""
     if larger:
+        obstacle = find_obstacle(exemplar, size, (wrap[0], wrap[1]))
         source, way, tried = enlarge(exemplar, size, wrap, watch)
     else:
         source, found, reasons = _join_ends(exemplar.guidance, elements, size, choices, wrap, already, refused, watch)
@@ -287,6 +289,7 @@ def _join_edges(
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "way": way,
+        "refused": {"lattice": obstacle} if obstacle else {},
         "candidates": None if tried is None else {name: dict(figures) for name, figures in tried.items()},
         "size": list(source.shape),
         "wrap": list(wrap),

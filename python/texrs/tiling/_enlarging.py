@@ -17,7 +17,7 @@ from texrs._comparison_of_ways import choose, try_ways
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
-from texrs.exemplar.regularity import bend, find_lattice
+from texrs.exemplar.regularity import Lattice, bend, find_lattice
 from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
 from texrs.mosaic import rearrange_cells
@@ -25,7 +25,7 @@ from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 from texrs.tiling._whole_elements import find_whole_elements
 
-__all__ = ["Enlarging", "enlarge"]
+__all__ = ["Enlarging", "enlarge", "find_obstacle"]
 
 Enlarging: TypeAlias = Literal["still", "lattice", "stitch", "cells"]
 """Ways to enlarge an image, as in `texrs.design`."""
@@ -45,9 +45,8 @@ def enlarge(
     exemplar: Exemplar, size: tuple[int, int], wrap: Sequence[bool], watch: Progress
 ) -> tuple[SourceMap, Enlarging, Mapping[Enlarging, Mapping[str, float]] | None]:
     """Return the source map of a larger periodic texture, its way, and the figures of all ways that were tried."""
-    lattice = find_lattice(exemplar.guidance)
-    own: Enlarging = "still" if lattice is None else "lattice"
-    if lattice is not None or min(exemplar.shape) < TRIED:
+    own: Enlarging = "still" if find_obstacle(exemplar, size, (wrap[0], wrap[1])) else "lattice"
+    if own == "lattice" or min(exemplar.shape) < TRIED:
         return lay(exemplar, own, size, wrap, watch), own, None
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
 
@@ -74,6 +73,19 @@ def enlarge(
         return lay(exemplar, own, size, wrap, watch), own, tried
 
 
+def find_obstacle(exemplar: Exemplar, size: tuple[int, int], wrap: tuple[bool, bool]) -> str:
+    """Return the reason why a larger texture cannot be laid in step with a lattice, or an empty text."""
+    lattice = find_fine_lattice(exemplar)
+    if lattice is None:
+        return "no lattice was found in the image"
+    return lattice.explain(size, wrap) if lattice.close(size, wrap) is None else ""
+
+
+def find_fine_lattice(exemplar: Exemplar) -> Lattice | None:
+    """Return the lattice of an image at its full size, because a fine lattice is not visible in a small copy."""
+    return exemplar.cached("fine lattice", lambda: find_lattice(exemplar.guidance))
+
+
 def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
     """Return the source map of a periodic texture of any size in one way."""
     shape, colours = (exemplar.shape[0], exemplar.shape[1]), exemplar.guidance
@@ -84,28 +96,23 @@ def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequenc
         turns = (True, True) in exemplar.mirror_symmetries
         laid = rearrange_cells(exemplar.segment().elements, colours, size, turns=turns, seed=0)
         return SourceMap.from_coordinates(laid.places, shape, label=laid.label, jacobian=laid.frames)
-    elements = find_whole_elements(colours)
+    elements, both = find_whole_elements(colours), (wrap[0], wrap[1])
     picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * elements.depth, elements.regular)
     return quilt(
-        [close_lattice(picture, size, wrap)],
+        [close_lattice(exemplar, picture, size, both) if way == "lattice" else picture],
         size,
         patch=max(2, round(PATCH * min(shape))),
         overlap=max(1, round(OVERLAP * min(shape))),
-        wrap=(wrap[0], wrap[1]),
+        wrap=both,
         seed=0,
         progress=lambda share: watch("quilt", share),
     )
 
 
-def close_lattice(picture: Picture, size: tuple[int, int], wrap: Sequence[bool]) -> Picture:
-    """Stretch an image so that whole periods of its lattice fit the result.
-
-    Leave it unchanged if the stretch is too large.
-
-    The lattice is searched at the full size, because a fine lattice is not visible in a small copy.
-    """
-    lattice = find_lattice(picture.colours)
-    closing = None if lattice is None else lattice.close(size, (wrap[0], wrap[1]))
+def close_lattice(exemplar: Exemplar, picture: Picture, size: tuple[int, int], wrap: tuple[bool, bool]) -> Picture:
+    """Stretch an image so that whole periods of its lattice fit the result."""
+    lattice = find_fine_lattice(exemplar)
+    closing = None if lattice is None else lattice.close(size, wrap)
     if lattice is None or closing is None:
         return picture
     source = bend(picture.source.shape, closing)

@@ -63,7 +63,7 @@ def describe(
         "reason": first.parts.reason,
         "arrangement": ["courses" if p.way == "courses" else classify(p.parts) for p in plans],
         "way": [p.way for p in plans],
-        "refused": [describe_obstacles(p) for p in plans],
+        "refused": [describe_obstacles(p, arguments) for p in plans],
         "candidates": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
         "lattice_stretch": [describe_closing(p, arguments) for p in plans],
@@ -77,9 +77,9 @@ def describe(
     }
 
 
-def describe_obstacles(plan: Plan) -> dict[str, str]:
-    """Return the reason for each way that an exemplar does not allow."""
-    reasons = {way: find_obstacle(plan, way) for way in get_args(Way)}
+def describe_obstacles(plan: Plan, arguments: Arguments) -> dict[str, str]:
+    """Return the reason for each way that an exemplar or the size of the texture does not allow."""
+    reasons = {way: find_obstacle(plan, way, arguments.size, arguments.wrap) for way in get_args(Way)}
     return {way: reason for way, reason in reasons.items() if reason}
 
 

@@ -84,8 +84,8 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     elements : ElementOptions
         Options with which the elements were found.
     arguments : Arguments
-        Arguments of the request. The seed and the size are not used, so that all textures of an exemplar are treated
-        the same way.
+        Arguments of the request. The seed is not used, and the size only decides whether a lattice closes. Otherwise
+        all textures of an exemplar are treated the same way.
 
     """
     if plan.literal:
@@ -93,17 +93,18 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     if arguments.way != "auto":
         way = arguments.way
         if way == "still":
-            way = "courses" if plan.parts.courses else "lattice" if plan.parts.lattice else way
-        obstacle = find_obstacle(plan, way)
+            closes = not find_obstacle(plan, "lattice", arguments.size, arguments.wrap)
+            way = "courses" if plan.parts.courses else "lattice" if closes else way
+        obstacle = find_obstacle(plan, way, arguments.size, arguments.wrap)
         if obstacle:
             raise InvalidInput(f'way: must be another way than "{way}", because {obstacle}')
         return replace(plan, way=way)
-    ways = list_ways(plan)
+    ways = list_ways(plan, arguments.size, arguments.wrap)
     if arguments.deformation != DeformationOptions():
         return plan
     if len(ways) == 1:
         return replace(plan, way=ways[0])
-    key = ("design trials", elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
+    key = ("design trials", *ways, elements.key, arguments.side, min(TILES, arguments.copies), arguments.screening)
     made: dict[Way, list[Tile]] = {}
 
     def judge_each() -> tuple[dict[Way, dict[str, float]], Array]:
@@ -156,15 +157,19 @@ def try_way(
 
     None if a new arrangement of its cells or elements is impossible, or bends the cells too much.
     """
-    if find_obstacle(plan, plan.way):
+    # A trial can be larger than `SIDE`, so that a lattice closes.
+    if find_obstacle(plan, plan.way, (SIDE, SIDE), (False, False)):
         # The elements of a reduced exemplar can be too small.
         return None
+    lattice, size = plan.parts.lattice, (SIDE, SIDE)
+    if lattice is not None and lattice.close(size, (True, True)) is None:
+        size = lattice.find_size(size, (True, True)) or size
     small = replace(
         arguments,
         side=plan.side,
         exemplars=[exemplar],
         guides=[exemplar],
-        size=(SIDE, SIDE),
+        size=size,
         wrap=(True, True),
         shares=np.ones(1),
         density=None,

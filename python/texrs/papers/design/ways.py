@@ -3,7 +3,7 @@
 - "move": patches of copies whose elements moved, as in the paper (sections 3.1 and 3.3).
 - "still": patches of the unchanged exemplar and its mirror images, on a grid.
 - "lattice": the same for an exemplar on a lattice. Patches are in step with the lattice. It is stretched so that whole
-  periods fit a periodic texture.
+  periods fit a periodic texture. If this would change it too much, this way is refused.
 - "courses": patches of sheets that are built from the courses of the exemplar.
 - "stitch": patches of the unchanged exemplar, each where it fits best.
 - "cells": bent cells of the exemplar in a new arrangement of its cells, for jointed cells and heaps.
@@ -50,32 +50,34 @@ SMALLEST = 12
 """Minimum size of cells that are bent, in pixels. The joints of smaller cells are not wide enough for cuts."""
 
 
-def list_ways(plan: Plan) -> list[Way]:
-    """Return the ways that are tried for an exemplar."""
+def list_ways(plan: Plan, size: tuple[int, int], wrap: tuple[bool, bool]) -> list[Way]:
+    """Return the ways that are tried for an exemplar, for textures of a size."""
     ways: list[Way] = ["move", "courses", "lattice", "still", "stitch", "cells", "sow"]
     if plan.parts.courses:
         return ["courses"]
     if plan.parts.kind == "grid":
         # Moved cells of a grid show more seams than patches, and nothing else.
         ways.remove("move")
-    if plan.parts.lattice is not None and plan.parts.lattice.correlation >= STRICT:
+    if plan.parts.lattice is not None and find_obstacle(plan, "lattice", size, wrap):
+        ways.remove("sow")
+    elif plan.parts.lattice is not None and plan.parts.lattice.correlation >= STRICT:
         # The stitcher does not keep its patches in step with a lattice.
         ways = [way for way in ways if way in ("move", "lattice")]
     elif plan.parts.lattice is not None:
         ways = [way for way in ways if way in ("move", "lattice", "stitch", "cells")]
-    else:
-        ways.remove("lattice")
-    return [way for way in ways if not find_obstacle(plan, way)]
+    return [way for way in ways if not find_obstacle(plan, way, size, wrap)]
 
 
-def find_obstacle(plan: Plan, way: Way) -> str:
-    """Return the reason against a way of laying an exemplar, or an empty text if there is none."""
+def find_obstacle(plan: Plan, way: Way, size: tuple[int, int], wrap: tuple[bool, bool]) -> str:
+    """Return the reason against a way of laying a texture of a size, or an empty text if there is none."""
     parts = plan.parts
     found = parts.kind in ("components", "labels")
     if way == "courses" and not parts.courses:
         return "no courses were found in the exemplar"
     if way == "lattice" and parts.lattice is None:
         return "no lattice was found in the exemplar"
+    if way == "lattice" and parts.lattice is not None and parts.lattice.close(size, wrap) is None:
+        return parts.lattice.explain(size, wrap)
     if way == "cells" and not (found and (parts.layout in ("jointed", "heap") or parts.kind == "labels")):
         return "neither jointed cells nor a heap of elements were found in the exemplar"
     if way == "sow" and not (found and plan.pure and classify(parts) == "apart"):
