@@ -13,11 +13,6 @@ from texrs.tiling._joints import make_levels
 
 REACH = 3.0
 """Distance from the outline where the depth inside an element becomes 1, in pixels of the coarsest level."""
-CLOSE = 0.5
-"""Minimum share of the image that close elements on a lattice, such as bricks, cover.
-
-Seams are not kept out of such elements.
-"""
 STEPS, ASLANT = 4, 0.08
 """Maximum multiple of the lattice vectors in the search for a period, and maximum slope of a period relative to its axis.
 """
@@ -76,10 +71,7 @@ def find_whole_elements(colours: Floats) -> WholeElements:
     scale = len(colours) / len(parts.elements)
     lattice = None if parts.lattice is None else scale * parts.lattice.vectors
     strict = parts.lattice is not None and parts.lattice.correlation >= STRICT
-    close = (parts.elements > 0).mean() > CLOSE
-    # Do not guide seams along the joints between bricks: joints continue across every seam, so such a seam would be
-    # visible.
-    if parts.kind != "components" or (lattice is not None and close):
+    if parts.kind != "components":
         return replace(nothing, lattice=lattice, strict=strict)
     depth = parts.measure_depth(REACH)
     rows, columns = (np.arange(n) * m // n for n, m in zip(colours.shape, depth.shape, strict=False))

@@ -40,8 +40,6 @@ PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two patches, as shares of the exemplar's shorter side."""
 DEEP = 6.0
 """Depth in pixels beyond which all pixels of an element count as equally deep."""
-CLOSE = 0.5
-"""Share of the exemplar's area above which its elements count as close to each other."""
 FEWEST = 6
 """Minimum number of whole elements for a new arrangement."""
 STRICT = 0.65
@@ -200,14 +198,9 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list
 
 
 def measure_depth(plan: Plan) -> Floats:
-    """Return the depth of each pixel of an exemplar inside an element, so that seams run between elements.
-
-    The depth is 0 for a dense lattice, such as bricks. The joints between its elements continue across every seam, and
-    a seam that follows them would be visible.
-    """
+    """Return the depth of each pixel of an exemplar inside an element, so that seams run between elements."""
     parts = plan.parts
-    jointed = parts.lattice is not None and (parts.elements > 0).mean() > CLOSE
-    if jointed or parts.kind not in ("components", "labels"):
+    if parts.kind not in ("components", "labels"):
         return np.zeros(plan.guide.shape[:2], np.float32)
     return DEEP * parts.measure_depth(DEEP)
 
