@@ -108,7 +108,9 @@ def test_seeds_differ_from_each_other_and_from_the_exemplar(name):
 def test_seams_of_brickwork_run_along_joints_and_not_through_bricks():
     """A brick of two colours is visible, so most seams are within two pixels of the outline of a brick."""
     sample = samples.bricks((192, 192))
-    outlines = ndimage.binary_dilation(ndimage.grey_dilation(sample.labels, 3) != ndimage.grey_erosion(sample.labels, 3))
+    outlines = ndimage.binary_dilation(
+        ndimage.grey_dilation(sample.labels, 3) != ndimage.grey_erosion(sample.labels, 3)
+    )
     for seed in SEEDS:
         result = texrs.design(sample.image, SIZE, seed=seed, way="lattice")
         at = np.asarray(result.source_map.coordinates).round().astype(int)

@@ -152,6 +152,23 @@ def test_a_lattice_is_cut_at_whole_periods_and_the_report_contains_the_reason(na
     assert length > 256 - 1.5 * period
 
 
+@pytest.mark.parametrize("way", ["still", "lattice", "stitch", "cells"])
+def test_a_larger_result_is_laid_in_the_given_way(way):
+    image = samples.bricks((128, 128)).image
+    made = texrs.tile(image, size=200, way=way)
+    assert (made.report["way"], made.report["candidates"], made.image.shape) == (way, None, (200, 200, 3))
+    assert made.report["tiling"]["columns"]["tiles"]
+
+
+def test_ways_that_do_not_suit_the_image_or_the_size_are_errors():
+    image = samples.pebbles((96, 96)).image
+    with pytest.raises(InvalidInput, match="lattice. is not possible: no lattice was found"):
+        texrs.tile(image, size=200, way="lattice")
+    for size in (None, 64):
+        with pytest.raises(InvalidInput, match='way: must be "auto" for a result that is not larger'):
+            texrs.tile(image, size=size, way="still")
+
+
 def test_a_lattice_closes_at_sizes_larger_than_the_picture():
     from scipy.ndimage import gaussian_filter
 

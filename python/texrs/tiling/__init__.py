@@ -37,11 +37,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_size, as_wrap, check_work
+from texrs._arrays import as_bool, as_choice, as_float, as_image, as_int, as_size, as_wrap, check_work
 from texrs._lighting_correction import flatten_lighting as even_light
 from texrs._notices import assume, collect
 from texrs._palettes import find as find_palette
@@ -57,7 +58,7 @@ from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling._borders import SEEN
 from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
-from texrs.tiling._enlarging import enlarge, find_obstacle
+from texrs.tiling._enlarging import Enlarging, enlarge, find_obstacle
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
@@ -99,6 +100,7 @@ def tile(
     *,
     wrap: bool | Sequence[bool] | None = None,
     size: int | Sequence[int] | None = None,
+    way: Enlarging | Literal["auto"] = "auto",
     overlap: int | Sequence[int] | None = None,
     screening: float | None = None,
     flatten_lighting: bool | None = None,
@@ -119,6 +121,12 @@ def tile(
         the image, which must have at least 8 pixels a side. A lattice is then stretched so that it closes, if this
         changes it little. If the default size is smaller than the image, the report contains the reason. Default: the
         size of the image, or less along an axis if the joint is then clearly less visible.
+    way : {"auto", "still", "lattice", "stitch", "cells"}
+        Way that a larger result is laid in, as in `texrs.design`. "still" joins large patches on a grid, "lattice" the
+        same in step with a lattice of the image. "stitch" joins smaller patches, each where it fits best. "cells"
+        bends jointed cells or the stones of a heap into a new arrangement. "auto" tries the ways that suit the image
+        at a small size and uses the best one. Other ways than "auto" need a size that is larger than the image along
+        an axis. Default: "auto".
     overlap : int or (rows, columns), optional
         Overlap of two opposite edges in pixels, from 1 to half the side. It cannot be combined with ``size``. Default:
         the overlap with the least visible joint.
@@ -172,6 +180,7 @@ def tile(
     ------
     InvalidInput
         The image is a volume, a side is too short, the size or the overlap is out of range, or both are given.
+        Or the way does not suit the image or the size.
 
     References
     ----------
@@ -199,6 +208,8 @@ def tile(
         as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
     )
     choices = _as_choices(overlap, size is None, (rows, columns), wanted, cyclic)
+    if as_choice(way, "way", ("auto", *get_args(Enlarging))) != "auto" and wanted[0] <= rows and wanted[1] <= columns:
+        raise InvalidInput(f'way: must be "auto" for a result that is not larger than the image; got {way!r}')
     check_work("tile", [pixels], wanted, "image" if size is None else "size", way=LARGER)
     evened = None if flatten_lighting is None else as_bool(flatten_lighting, "flatten_lighting")
     with collect() as notices:
@@ -220,6 +231,7 @@ def tile(
             image,
             wrap=cyclic,
             size=wanted,
+            way=way,
             choices=choices,
             already=already,
             screening=weight,
@@ -248,6 +260,7 @@ def _join_edges(
     *,
     wrap: Sequence[bool],
     size: tuple[int, int],
+    way: Enlarging | Literal["auto"],
     choices: Sequence[Choice],
     already: Sequence[int],
     screening: float,
@@ -267,10 +280,10 @@ def _join_edges(
     reasons: dict[str, str] = {}
     elements = None if len(already) == sum(wrap) else find_whole_elements(exemplar.guidance)
     # A larger result is a quilt of patches. Otherwise join the ends of the image.
-    way, tried, obstacle = None, None, ""
+    laid, tried, obstacle = None, None, ""
     if larger:
         obstacle = find_obstacle(exemplar, size, (wrap[0], wrap[1]))
-        source, way, tried = enlarge(exemplar, size, wrap, watch)
+        source, laid, tried = enlarge(exemplar, size, wrap, way, watch)
     else:
         source, found, reasons = _join_ends(exemplar.guidance, elements, size, choices, wrap, already, refused, watch)
     weight = screening if found or larger else 0.0
@@ -288,7 +301,7 @@ def _join_edges(
     # Measure the finished image, because the colour correction changes the visibility of borders and seams.
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
-        "way": way,
+        "way": laid,
         "refused": {"lattice": obstacle} if obstacle else {},
         "candidates": None if tried is None else {name: dict(figures) for name, figures in tried.items()},
         "size": list(source.shape),

@@ -42,10 +42,15 @@ TRIED = 32
 
 
 def enlarge(
-    exemplar: Exemplar, size: tuple[int, int], wrap: Sequence[bool], watch: Progress
+    exemplar: Exemplar, size: tuple[int, int], wrap: Sequence[bool], way: Enlarging | Literal["auto"], watch: Progress
 ) -> tuple[SourceMap, Enlarging, Mapping[Enlarging, Mapping[str, float]] | None]:
     """Return the source map of a larger periodic texture, its way, and the figures of all ways that were tried."""
-    own: Enlarging = "still" if find_obstacle(exemplar, size, (wrap[0], wrap[1])) else "lattice"
+    obstacle = find_obstacle(exemplar, size, (wrap[0], wrap[1]))
+    if way == "lattice" and obstacle:
+        raise InvalidInput(f'way: "lattice" is not possible: {obstacle}')
+    if way != "auto":
+        return lay(exemplar, way, size, wrap, watch), way, None
+    own: Enlarging = "still" if obstacle else "lattice"
     if own == "lattice" or min(exemplar.shape) < TRIED:
         return lay(exemplar, own, size, wrap, watch), own, None
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
