@@ -42,6 +42,14 @@ KERNELS = {
     "gather": "_rust.gather([image], (False, False), np.zeros(0, np.uint16), points, 'linear')",
     "nearby": "_rust.sum_nearby(corner, np.ones(1, np.float32), (side, side), True, (1.0, 0.5))",
     "smooth": "_rust.smooth(image.reshape(-1), image.shape, [((0.5, 0.25), 'reflect')] * 2 + [((), 'reflect')])",
+    "contours": "_rust.contour_strength(words, 64, 30.0)",
+    "watershed": "_rust.watershed_regions(one, 2)",
+    "adjacency": "_rust.region_adjacency(words.astype(np.uint32), one, 1 << 18, 0.5)",
+    "candidates": "_rust.region_candidates(area, colour, pairs, borders, area < 0, [(1, 0, 0)] * 8, 4, 4000)",
+    "measures": "_rust.measure_regions(starts, members, pairs, edges, leaf_words, extremes)",
+    "sums": "_rust.sum_regions(starts, members, np.ones((len(area), 256)))",
+    "disjoint sets": "_rust.choose_disjoint(tops, places_of, worth, worth, 4)",
+    "outlines": "_rust.refine_outlines(disc.astype(np.int32), image[..., 0].copy(), one, 0.5, [0, 24])",
     "place": "_rust.place(one, (0, 0), (512, 512), ((1, 0.1), (0, 1)), (0.5, 0), (side, side), 1.0)",
     "points": "_rust.warp_points(corners, corners, (side, side))",
     "warp": "_rust.warp_mesh((side, side), places.reshape(-1, 2), np.zeros(side * side, np.uint8), (side, side), None)",
@@ -83,6 +91,13 @@ pixels = (np.zeros(many, np.uint16), points, np.zeros(many, bool), np.zeros(many
 patches_of, begin = _rust.PatchSamples(flat, np.zeros(many, np.float32), (0.1, 0.1)), (((0, 64, 0, 0),) * 2, 0, (0, 0))
 patched = ((side, side), (False, False), (64, 64), False, None)
 matrix = [each for each in _list_entries(diags_array([-1.0, 4.1, -1.0], offsets=[-128, 0, 128], shape=(side * 64,) * 2))]
+words = rng.integers(0, 64, (side, side), np.uint8)
+leaves, count = _rust.watershed_regions(image[..., 0].copy(), 2)
+pairs, edges, extremes = _rust.region_adjacency(leaves, one, count, 0.5)
+area, colour, borders = np.bincount(leaves.ravel()).astype(float), rng.random((count, 3)), edges[:, :2].copy()
+leaf_words = np.ones((count, 8), np.float32)
+starts, members, _ = _rust.region_candidates(area, colour, pairs, borders, area < 0, [(0, 1, 0)], 4, 1000)
+tops, places_of, worth = np.arange(many + 1), np.arange(many, dtype=np.uint32), rng.random(many)
 clean = (TexrsError, MemoryError)
 _rust.poisson(image[:16, :16].copy(), None, 0.01, ('free', 'free'), None, None)
 

@@ -5,6 +5,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use super::{grouped, run};
+use crate::foundation::memory;
 use crate::kernels::hierarchy::candidates::candidates;
 use crate::kernels::hierarchy::measure::{self, Values};
 use crate::kernels::hierarchy::merge::Cost;
@@ -13,7 +14,7 @@ use crate::kernels::watershed::{self, DIRECTIONS};
 use crate::kernels::{contours, packing};
 use crate::{Error, Result};
 
-/// Returns how fast the local histogram of labels changes at each pixel.
+/// Returns how fast the local histogram of labels (rows, columns) changes at each pixel. Labels are below `count`.
 #[pyfunction]
 pub(super) fn contour_strength<'py>(
     py: Python<'py>,
@@ -29,7 +30,7 @@ pub(super) fn contour_strength<'py>(
     PyArray1::from_vec(py, found).reshape(shape)
 }
 
-/// Returns the watershed region of each pixel, and the number of regions.
+/// Returns the watershed region of each pixel of an image (rows, columns), and the number of regions.
 #[pyfunction]
 pub(super) fn watershed_regions<'py>(
     py: Python<'py>,
@@ -51,7 +52,8 @@ type Adjacency<'py> = (
     Bound<'py, PyArray3<f32>>,
 );
 
-/// Returns the adjacency of regions.
+/// Returns the adjacency of regions: pairs (P, 2), their borders (P, 3) and extreme pixels (`count`, 32, 2). `labels` and
+/// `strength` have the shape (rows, columns), and labels are below `count`.
 #[pyfunction]
 pub(super) fn region_adjacency<'py>(
     py: Python<'py>,
@@ -81,7 +83,8 @@ type Candidates<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Returns the nodes of several merge trees of regions. Each row (arcs, means, small) of `costs` gives one tree.
+/// Returns the nodes of several merge trees of regions. Each row (arcs, means, small) of `costs` gives one tree. N
+/// regions have `area` (N,), `mean` (N, 3) and `open` (N,). P borders have `pairs` (P, 2) and `arcs` (P, 2).
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // one argument for each option of the kernel
 pub(super) fn region_candidates<'py>(
@@ -109,24 +112,28 @@ pub(super) fn region_candidates<'py>(
     let found = run(py, None, |monitor| {
         candidates(&graph, &costs, open, [least, most], monitor)
     })?;
-    let starts = found.sets.starts().iter().map(|&s| s as i64).collect();
+    let (starts, members) = found.sets.into_parts();
+    let starts = starts.into_iter().map(|s| s as i64).collect();
     Ok((
         PyArray1::from_vec(py, starts),
-        PyArray1::from_vec(py, found.sets.members().to_vec()),
+        PyArray1::from_vec(py, members),
         PyArray1::from_vec(py, found.seam),
     ))
 }
 
 fn sets(starts: &[i64], members: &[u32]) -> Result<Sets> {
-    let starts = starts.iter().map(|&s| usize::try_from(s));
-    let starts = starts.collect::<std::result::Result<_, _>>();
-    let starts = starts.map_err(|_| Error::value("starts", "must be at least 0"))?;
+    if starts.iter().any(|&s| s < 0) {
+        return Err(Error::value("starts", "must be at least 0"));
+    }
+    memory::room("sets of regions", 2 * starts.len() + members.len(), 4)?;
+    let starts = starts.iter().map(|&s| s as usize).collect();
     Sets::new(starts, members.to_vec())
 }
 
 /// Returns the measures of sets of regions, one row per set. Three sums along the outer border and three sums of
 /// borders inside come first. Then follow the areas of the convex hull and of the smallest rectangle, the extent and
-/// the contrast. The last one is the fraction of the border whose two sides look similar.
+/// the contrast. The last one is the fraction of the border whose two sides look similar. N regions have `histograms`
+/// (N, bins) and `extremes` (N, 32, 2). P borders have `pairs` (P, 2) and `arcs` (P, 3).
 #[pyfunction]
 pub(super) fn measure_regions<'py>(
     py: Python<'py>,
@@ -159,13 +166,11 @@ pub(super) fn measure_regions<'py>(
     let found = run(py, None, |monitor| {
         measure::measure(&sets, &values, monitor)
     })?;
-    let rows: Vec<f64> = found
-        .iter()
-        .flat_map(|m| {
-            let shape = [m.hull, m.rectangle, m.extent, m.contrast, m.alike];
-            m.outer.into_iter().chain(m.inner).chain(shape)
-        })
-        .collect();
+    let mut rows = Vec::with_capacity(11 * found.len());
+    for m in &found {
+        rows.extend(m.outer.iter().chain(&m.inner));
+        rows.extend([m.hull, m.rectangle, m.extent, m.contrast, m.alike]);
+    }
     PyArray1::from_vec(py, rows).reshape([found.len(), 11])
 }
 

@@ -229,7 +229,8 @@ fn axes<'py, const D: usize>(
     Ok((PyArray1::from_vec(py, found.labels), found.energy))
 }
 
-/// Returns labels whose outlines are minimum cuts in bands around the given outlines.
+/// Returns labels (rows, columns) whose outlines are minimum cuts in bands around the given outlines. `inside` and `price`
+/// have the same shape, and `reach` has one value for each label.
 #[pyfunction]
 pub(super) fn refine_outlines<'py>(
     py: Python<'py>,

@@ -6,6 +6,7 @@
 
 use crate::foundation::error::check_shape;
 use crate::foundation::libm::exp;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::simd::wide_fn;
 use crate::{Error, Result};
@@ -56,6 +57,11 @@ pub fn strength(
     monitor.check()?;
     let weights = gaussian(sigma);
     let lanes = count.next_multiple_of(LANES);
+    // Each thread has the histograms of the rows of one task and of the rows around it.
+    let high = ROWS.min(rows) + 2 * weights.len() + 3;
+    let tasks = rows.div_ceil(ROWS).min(par::threads());
+    let values = rows + tasks * high * lanes;
+    memory::room("the strength of contours", columns, 4 * values)?;
     let mut out = vec![0.0f32; rows * columns];
     par::chunks_mut(&mut out, ROWS * columns, |chunk, out| {
         let first = chunk * ROWS;

@@ -4,12 +4,14 @@
 //! that it overlaps, if it is worth more than these together. Sets that overlap no chosen set are added. These
 //! exchanges are repeated until nothing changes or the number of rounds is reached.
 
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::kernels::hierarchy::Sets;
 use crate::{Error, Result};
 
-/// Value for a region that no chosen set contains.
-const NONE: u32 = u32::MAX;
+/// Value for a region that no chosen set contains. It is 0, because zeros take up memory only when they are replaced.
+/// Therefore a region may have a large number.
+const NONE: u32 = 0;
 
 /// Returns a flag for each set: whether it is chosen. Sets with a worth of 0 or less, or NaN, are never chosen. At
 /// most `rounds` rounds of exchanges are made.
@@ -30,6 +32,7 @@ pub fn choose(
         }
     }
     monitor.check()?;
+    memory::room("the choice of sets", sets.len(), 32)?;
     let sorted = |key: &[f64]| {
         let mut order: Vec<u32> = (0..sets.len() as u32)
             .filter(|&i| worth[i as usize] > 0.0)
@@ -37,12 +40,14 @@ pub fn choose(
         order.sort_by(|&a, &b| key[b as usize].total_cmp(&key[a as usize]));
         order
     };
-    let mut owner = vec![NONE; sets.bound()];
+    // The number of the chosen set that contains each region, from 1.
+    let mut owner = memory::filled("the regions", NONE, sets.bound())?;
     let mut chosen = vec![false; sets.len()];
+    let mut is_rival = vec![false; sets.len()];
     let take = |i: u32, owner: &mut [u32], chosen: &mut [bool]| {
         chosen[i as usize] = true;
         for &leaf in sets.get(i as usize) {
-            owner[leaf as usize] = i;
+            owner[leaf as usize] = i + 1;
         }
     };
     let free = |i: u32, owner: &[u32]| {
@@ -65,13 +70,16 @@ pub fn choose(
                 continue;
             }
             // Chosen sets are worth more than 0, so stop as soon as some of them are worth as much as this set.
-            rivals.clear();
+            for r in rivals.drain(..) {
+                is_rival[r as usize] = false;
+            }
             let mut rival = 0.0;
             let better = sets.get(i as usize).iter().all(|&leaf| {
                 let other = owner[leaf as usize];
-                if other != NONE && !rivals.contains(&other) {
-                    rivals.push(other);
-                    rival += worth[other as usize];
+                if other != NONE && !is_rival[other as usize - 1] {
+                    is_rival[other as usize - 1] = true;
+                    rivals.push(other - 1);
+                    rival += worth[other as usize - 1];
                 }
                 worth[i as usize] > rival + 1e-9
             });
@@ -106,7 +114,7 @@ mod tests {
     fn sets(lists: &[&[u32]]) -> Sets {
         let mut sets = Sets::default();
         for list in lists {
-            sets.push(list.iter().copied());
+            sets.push(list).unwrap();
         }
         sets
     }
@@ -135,5 +143,13 @@ mod tests {
         .unwrap();
         assert_eq!(found, [true, false, false]);
         assert!(choose(&sets, &[1.0], &[1.0], 1, &Monitor::default()).is_err());
+    }
+
+    #[test]
+    fn numbers_of_regions_may_be_large() {
+        let sets = sets(&[&[7, 1 << 24], &[1 << 24], &[]]);
+        let worth = [1.0, 2.0, f64::INFINITY];
+        let found = choose(&sets, &worth, &worth, usize::MAX, &Monitor::default()).unwrap();
+        assert_eq!(found, [false, true, true]);
     }
 }

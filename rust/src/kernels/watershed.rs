@@ -14,6 +14,8 @@ use crate::{Error, Result};
 const LEVELS: usize = 4096;
 /// Value for no pixel and for no region.
 const NONE: u32 = u32::MAX;
+/// Maximum reach. The time grows with the reach, and the element finder uses 2.
+const FARTHEST: usize = 64;
 /// Number of directions of [`Regions::extremes`].
 pub const DIRECTIONS: usize = 32;
 
@@ -21,7 +23,7 @@ pub const DIRECTIONS: usize = 32;
 /// `reach` rows and columns. Adjacent pixels of this kind begin the same region.
 ///
 /// # Errors
-/// The size of `height` does not match the shape, or a height is not finite.
+/// The size of `height` does not match the shape. A height or the range of heights is not finite. `reach` exceeds 64.
 pub fn flood(
     height: &[f32],
     shape: [usize; 2],
@@ -29,8 +31,19 @@ pub fn flood(
     monitor: &Monitor,
 ) -> Result<(Vec<u32>, usize)> {
     check_shape("height", &shape, height.len())?;
-    if height.iter().any(|v| !v.is_finite()) {
-        return Err(Error::value("height", "must be finite"));
+    if reach > FARTHEST {
+        let message = format!("must be at most {FARTHEST}, got {reach}");
+        return Err(Error::value("reach", message));
+    }
+    let (least, most) = height
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| {
+            (a.min(v), b.max(v))
+        });
+    // The range overflows if heights are near both ends of the type, which leaves no order of heights.
+    if height.iter().any(|v| !v.is_finite()) || most - least == f32::INFINITY {
+        let message = "must be finite, and their range also";
+        return Err(Error::value("height", message));
     }
     if height.len() >= NONE as usize {
         return Err(Error::value(
@@ -38,17 +51,10 @@ pub fn flood(
             format!("must have less than {NONE} pixels"),
         ));
     }
-    memory::room("a watershed", height.len(), 16)?;
+    memory::room("a watershed", height.len(), 20)?;
     monitor.check()?;
-    let low = least_nearby(height, shape, reach);
-    let minima: Vec<bool> = height.iter().zip(&low).map(|(a, b)| a == b).collect();
-    let (mut label, count) = components(&minima, shape);
+    let (mut label, count) = components(&minima(height, shape, reach), shape);
     // Flood. The first region that reaches a pixel adds it to the queue, at the level of the water.
-    let (least, most) = height
-        .iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| {
-            (a.min(v), b.max(v))
-        });
     let scale = (LEVELS - 1) as f32 / (most - least).max(f32::MIN_POSITIVE);
     let level = |p: usize| (((height[p] - least) * scale) as usize).min(LEVELS - 1);
     let mut queue = Levels::new(height.len());
@@ -88,6 +94,12 @@ fn neighbours(p: usize, [rows, columns]: [usize; 2], mut f: impl FnMut(usize)) {
     }
 }
 
+/// Returns whether each pixel is the lowest within `reach` rows and columns.
+fn minima(height: &[f32], shape: [usize; 2], reach: usize) -> Vec<bool> {
+    let low = least_nearby(height, shape, reach);
+    height.iter().zip(&low).map(|(a, b)| a == b).collect()
+}
+
 /// Returns the least value of each window of `2 reach + 1` rows and columns.
 fn least_nearby(values: &[f32], [rows, columns]: [usize; 2], reach: usize) -> Vec<f32> {
     let mut along = values.to_vec();
@@ -115,18 +127,18 @@ fn least_nearby(values: &[f32], [rows, columns]: [usize; 2], reach: usize) -> Ve
 /// pixels, and the number of components.
 fn components(flags: &[bool], shape: [usize; 2]) -> (Vec<u32>, usize) {
     let (mut label, mut count) = (vec![NONE; flags.len()], 0);
-    let mut stack = Vec::new();
+    let mut stack: Vec<u32> = Vec::new();
     for p in 0..flags.len() {
         if !flags[p] || label[p] != NONE {
             continue;
         }
         label[p] = count;
-        stack.push(p);
+        stack.push(p as u32);
         while let Some(p) = stack.pop() {
-            neighbours(p, shape, |q| {
+            neighbours(p as usize, shape, |q| {
                 if flags[q] && label[q] == NONE {
                     label[q] = count;
-                    stack.push(q);
+                    stack.push(q as u32);
                 }
             });
         }
@@ -195,10 +207,11 @@ pub fn directions() -> [[f64; 2]; DIRECTIONS] {
     })
 }
 
-/// Returns the adjacency of `count` regions. The strength between two pixels is the larger of their strengths.
+/// Returns the adjacency of `count` regions. The strength between two pixels is the larger of their strengths. The
+/// extreme pixels of a region without pixels are (0, 0).
 ///
 /// # Errors
-/// The sizes of the arrays do not match the shape, or a region is out of range.
+/// The sizes of the arrays do not match the shape. A region is out of range, a strength is not finite, or `weak` is NaN.
 pub fn adjacency(
     label: &[u32],
     strength: &[f32],
@@ -207,17 +220,32 @@ pub fn adjacency(
     weak: f32,
     monitor: &Monitor,
 ) -> Result<Regions> {
-    check_shape("label", &shape, label.len())?;
+    check_shape("labels", &shape, label.len())?;
     check_shape("strength", &shape, strength.len())?;
     if let Some(bad) = label.iter().find(|&&l| l as usize >= count) {
         return Err(Error::value(
-            "label",
+            "labels",
             format!("must be below {count}, got {bad}"),
         ));
     }
+    if strength.iter().any(|v| !v.is_finite()) {
+        return Err(Error::value("strength", "must be finite"));
+    }
+    if weak.is_nan() {
+        return Err(Error::value("weak", "must be a number, got NaN"));
+    }
     monitor.check()?;
     let [rows, columns] = shape;
-    let mut sides: Vec<(u64, f32)> = Vec::new();
+    let mut length = 0;
+    for p in 0..label.len() {
+        neighbours(p, shape, |q| {
+            length += usize::from(q > p && label[p] != label[q]);
+        });
+    }
+    let extreme = count.saturating_mul(DIRECTIONS * 16);
+    let bytes = extreme.saturating_add(length.saturating_mul(56));
+    memory::room("the adjacency of regions", bytes, 1)?;
+    let mut sides: Vec<(u64, f32)> = Vec::with_capacity(length);
     let directions = directions();
     let mut far = vec![[f64::NEG_INFINITY; DIRECTIONS]; count];
     let mut extremes = vec![[[0.0f32; 2]; DIRECTIONS]; count];
@@ -251,8 +279,11 @@ pub fn adjacency(
     }
     // The sort is stable, so strengths are summed in the order of pixels.
     sides.sort_by_key(|side| side.0);
-    let (mut pairs, mut arcs): (Vec<[u32; 2]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
-    for run in sides.chunk_by(|a, b| a.0 == b.0) {
+    let runs = || sides.chunk_by(|a, b| a.0 == b.0);
+    let touching = runs().count();
+    let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(touching);
+    let mut arcs: Vec<[f64; 3]> = Vec::with_capacity(touching);
+    for run in runs() {
         pairs.push([(run[0].0 >> 32) as u32, run[0].0 as u32]);
         let mut sums = [0.0; 3];
         for &(_, value) in run {
@@ -311,5 +342,25 @@ mod tests {
         assert_eq!(flood(&[], [0, 4], 2, &monitor).unwrap(), (vec![], 0));
         assert!(flood(&[f32::NAN], [1, 1], 2, &monitor).is_err());
         assert!(adjacency(&[1], &[0.0], [1, 1], 1, 0.0, &monitor).is_err());
+    }
+
+    #[test]
+    fn values_out_of_range_are_errors() {
+        let monitor = Monitor::default();
+        let named = |error: Result<(Vec<u32>, usize)>, name: &str| {
+            assert!(error.unwrap_err().to_string().starts_with(name));
+        };
+        named(flood(&[1.0, 2.0], [1, 2], usize::MAX, &monitor), "reach");
+        named(flood(&[f32::MIN, f32::MAX], [1, 2], 2, &monitor), "height");
+        let touch = |strength: f32, count: usize, weak: f32| {
+            adjacency(&[0, 0], &[strength; 2], [1, 2], count, weak, &monitor)
+        };
+        assert!(touch(f32::NAN, 1, 0.0).is_err() && touch(0.0, 1, f32::NAN).is_err());
+        assert!(matches!(
+            touch(0.0, usize::MAX / 64, 0.0),
+            Err(Error::Limit { .. })
+        ));
+        // Regions without pixels are allowed.
+        assert_eq!(touch(0.0, 3, 0.0).unwrap().extremes.len(), 3);
     }
 }

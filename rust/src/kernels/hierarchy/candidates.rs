@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use super::merge::{Cost, Tree, merge};
-use super::{Graph, Sets};
+use super::{Graph, Sets, check_finite};
 use crate::foundation::hash::Noise;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -25,7 +26,7 @@ pub struct Candidates {
 /// cannot be part of a hole, such as regions at the border of the image.
 ///
 /// # Errors
-/// The sizes of the arrays do not match.
+/// The sizes of the arrays do not match. An area is not above 0, or a value is not finite. `least` or `most` is NaN.
 pub fn candidates(
     graph: &Graph<'_>,
     costs: &[Cost],
@@ -40,8 +41,23 @@ pub fn candidates(
             format!("must have {} values, got {}", graph.len(), open.len()),
         ));
     }
+    for cost in costs {
+        check_finite("costs", &[cost.arcs, cost.means, cost.small])?;
+    }
+    for (argument, value) in [("least", least), ("most", most)] {
+        if value.is_nan() {
+            return Err(Error::value(argument, "must be a number, got NaN"));
+        }
+    }
     monitor.check()?;
-    let trees = par::map(costs.len(), |i| merge(graph, costs[i], most));
+    // Each merge needs a small map for each region. All trees are kept.
+    let each = 420 * graph.len() + 200 * graph.pairs.len();
+    let merges = costs.len().min(par::threads()).max(1);
+    let kept = graph.len().saturating_mul(costs.len()).saturating_mul(128);
+    let bytes = each.saturating_mul(merges).saturating_add(kept);
+    memory::room("the merge trees", bytes, 1)?;
+    let trees = par::map(costs.len(), |i| merge(graph, costs[i], most, monitor));
+    let trees: Vec<Tree> = trees.into_iter().collect::<Result<_>>()?;
     let near = graph.neighbours();
     let noise = Noise::new(0);
     let keys: Vec<u128> = (0..graph.len())
@@ -68,18 +84,18 @@ pub fn candidates(
             }
             let node = nodes.get(i);
             if area >= least {
-                found.add(node, tree.seam[i]);
+                found.add(node, tree.seam[i])?;
             }
             if let Some((filled, area)) = holes.fill(node, HOLES * area)
                 && (least..=most).contains(&area)
             {
-                found.add(&filled, 0.0);
+                found.add(&filled, 0.0)?;
             }
         }
     }
     for (i, &area) in graph.area.iter().enumerate() {
         if (least..=most).contains(&area) {
-            found.add(&[i as u32], 0.0);
+            found.add(&[i as u32], 0.0)?;
         }
     }
     Ok(found.out)
@@ -141,7 +157,7 @@ struct Found {
 }
 
 impl Found {
-    fn add(&mut self, set: &[u32], seam: f64) {
+    fn add(&mut self, set: &[u32], seam: f64) -> Result<()> {
         let key = set
             .iter()
             .fold(0u128, |key, &i| key.wrapping_add(self.keys[i as usize]));
@@ -149,12 +165,13 @@ impl Found {
         let at = *self.seen.entry(key).or_insert(next);
         if at < next {
             self.out.seam[at] = self.out.seam[at].max(seam);
-            return;
+            return Ok(());
         }
         let mut sorted = set.to_vec();
         sorted.sort_unstable();
-        self.out.sets.push(sorted);
+        self.out.sets.push(&sorted)?;
         self.out.seam.push(seam);
+        Ok(())
     }
 }
 
@@ -303,6 +320,20 @@ mod tests {
             ..graph
         };
         assert!(candidates(&graph, &[], &[], [0.0, 1.0], &Monitor::default()).is_err());
+        let one = |graph: &Graph<'_>, weight: f64, most: f64| {
+            let costs = [Cost {
+                arcs: weight,
+                means: 0.0,
+                small: 0.0,
+            }];
+            candidates(graph, &costs, &[true], [0.0, most], &Monitor::default())
+        };
+        assert!(one(&graph, 1.0, f64::INFINITY).is_ok());
+        assert!(one(&graph, f64::NAN, 1.0).is_err() && one(&graph, 1.0, f64::NAN).is_err());
+        for area in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let area = &[area];
+            assert!(one(&Graph { area, ..graph }, 1.0, 1.0).is_err());
+        }
         assert_eq!(
             candidates(&graph, &[], &[true], [0.0, 1.0], &Monitor::default())
                 .unwrap()

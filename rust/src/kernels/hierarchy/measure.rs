@@ -1,6 +1,7 @@
 //! Sums over the regions of each set and along its border, and the shape of its convex hull.
 
-use super::{Sets, check_pairs};
+use super::{Sets, check_finite, check_pairs};
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::kernels::watershed::{DIRECTIONS, directions};
 use crate::{Error, Result};
@@ -48,7 +49,8 @@ const ALIKE: f64 = 0.35;
 /// Measures each set.
 ///
 /// # Errors
-/// The sizes of the arrays do not match, or a set has a member without values.
+/// The sizes of the arrays do not match, or a set has a member without values. A value is not finite, or a histogram has
+/// a negative value.
 pub fn measure<const A: usize>(
     sets: &Sets,
     values: &Values<'_, A>,
@@ -70,6 +72,16 @@ pub fn measure<const A: usize>(
             format!("must have {n} rows of {} values", values.bins),
         ));
     }
+    check_finite("arcs", values.arcs.as_flattened())?;
+    let sound = |&v: &f32| v.is_finite() && v >= 0.0;
+    if !values.histograms.iter().all(sound) {
+        let message = "must be finite and at least 0";
+        return Err(Error::value("histograms", message));
+    }
+    let points = values.extremes.as_flattened().as_flattened();
+    if points.iter().any(|v| !v.is_finite()) {
+        return Err(Error::value("extremes", "must be finite"));
+    }
     if sets.bound() > n {
         return Err(Error::value(
             "members",
@@ -77,6 +89,9 @@ pub fn measure<const A: usize>(
         ));
     }
     monitor.check()?;
+    let work = n.saturating_mul(64 + 4 * par::threads());
+    let bytes = work + 40 * values.pairs.len() + 2 * sets.len() * size_of::<Measures<A>>();
+    memory::room("the measures of sets", bytes, 1)?;
     // The borders of each region: the region on the other side, and the index of the pair.
     let mut near: Vec<Vec<[u32; 2]>> = vec![Vec::new(); n];
     for (k, &[p, q]) in values.pairs.iter().enumerate() {
@@ -108,11 +123,15 @@ pub fn sums(sets: &Sets, values: &[f64], columns: usize, monitor: &Monitor) -> R
         || !values.len().is_multiple_of(columns)
         || sets.bound() > values.len() / columns
     {
-        let message = format!("must have {} rows of {columns} values", sets.bound());
+        let message = format!(
+            "must have at least {} rows of at least 1 value, got {columns} columns",
+            sets.bound()
+        );
         return Err(Error::value("values", message));
     }
     monitor.check()?;
-    let mut out = vec![0.0; sets.len() * columns];
+    let total = memory::product("values", &[sets.len(), columns])?;
+    let mut out = memory::filled("the sums of sets", 0.0, total)?;
     par::chunks_mut(&mut out, CHUNK * columns, |chunk, out| {
         for (k, sums) in out.chunks_exact_mut(columns).enumerate() {
             for &i in sets.get(chunk * CHUNK + k) {
@@ -285,5 +304,20 @@ mod tests {
         let wrong = Sets::new(vec![0, 1], vec![3]).unwrap();
         assert!(measure(&wrong, &values, &monitor).is_err());
         assert!(Sets::new(vec![0, 3], vec![0]).is_err());
+        let holes = Values {
+            histograms: &[f32::NAN; 6],
+            ..values
+        };
+        assert!(measure(&sets, &holes, &monitor).is_err());
+    }
+
+    #[test]
+    fn sums_that_do_not_fit_are_errors() {
+        let monitor = Monitor::default();
+        let empty = Sets::new(vec![0, 0, 0], vec![]).unwrap();
+        for columns in [0, 1 << 50, usize::MAX / 2, usize::MAX] {
+            assert!(sums(&empty, &[], columns, &monitor).is_err());
+        }
+        assert_eq!(sums(&empty, &[], 2, &monitor).unwrap(), [0.0; 4]);
     }
 }

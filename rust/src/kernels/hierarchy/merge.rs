@@ -4,7 +4,9 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::Graph;
+use crate::Result;
 use crate::foundation::libm::pow;
+use crate::foundation::par::Monitor;
 
 /// Cost of merging two regions: the mean strength along their border and the distance of their mean values, each with
 /// a weight.
@@ -61,7 +63,10 @@ impl Ord for Offer {
 
 /// Returns the merge trees of a graph. Nodes of more than `most` pixels absorb their neighbours in the
 /// same order, but are not part of a tree.
-pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
+///
+/// # Errors
+/// The monitor was cancelled.
+pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64, monitor: &Monitor) -> Result<Tree> {
     let n = graph.len();
     let mut tree = Tree {
         parts: Vec::new(),
@@ -87,7 +92,8 @@ pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
         }
         value
     };
-    let mut queue: BinaryHeap<Offer> = BinaryHeap::new();
+    let offers = graph.pairs.len();
+    let mut queue: BinaryHeap<Offer> = BinaryHeap::with_capacity(3 * offers);
     for (&[p, q], &arc) in graph.pairs.iter().zip(graph.arcs) {
         let (i, j) = (p as usize, q as usize);
         let cost = price(arc, [tree.area[i], tree.area[j]], [mean[i], mean[j]]);
@@ -98,6 +104,12 @@ pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
         let (i, j) = (p as usize, q as usize);
         if gone[i] || gone[j] {
             continue;
+        }
+        monitor.check()?;
+        // At most one offer for each pair of the graph is useful. Remove the others, which would need quadratic memory
+        // if a region has many neighbours.
+        if queue.len() > 2 * offers {
+            queue.retain(|offer| offer.pair.iter().all(|&p| !gone[p as usize]));
         }
         let area = [tree.area[i], tree.area[j]];
         let total = area[0] + area[1];
@@ -169,7 +181,7 @@ pub fn merge(graph: &Graph<'_>, cost: Cost, most: f64) -> Tree {
         }
         near.push(joined);
     }
-    tree
+    Ok(tree)
 }
 
 #[cfg(test)]
@@ -192,7 +204,9 @@ mod tests {
                 small: 0.0,
             },
             100.0,
-        );
+            &Monitor::default(),
+        )
+        .unwrap();
         assert_eq!(tree.parts, [[1, 2], [0, 3]]);
         assert_eq!(tree.area[3..], [30.0, 40.0]);
         assert_eq!(tree.seam[0], 0.5);
@@ -214,7 +228,9 @@ mod tests {
                 small: 0.0,
             },
             25.0,
-        );
+            &Monitor::default(),
+        )
+        .unwrap();
         assert_eq!(tree.parts, [[1, 2]]);
     }
 
@@ -234,7 +250,35 @@ mod tests {
                 small: 1.0,
             },
             9.0,
-        );
+            &Monitor::default(),
+        )
+        .unwrap();
         assert_eq!(tree.parts, [[0, 2]]);
+    }
+
+    #[test]
+    fn a_region_with_many_neighbours_is_merged_with_all_of_them() {
+        // Each merge changes the costs of all neighbours that are left, so old offers are removed many times.
+        let n = 200;
+        let pairs: Vec<[u32; 2]> = (1..n).map(|i| [0, i]).collect();
+        let arcs: Vec<[f64; 2]> = (1..n).map(|i| [1.0, f64::from(i * 37 % n)]).collect();
+        let graph = Graph {
+            area: &vec![1.0; n as usize],
+            mean: &vec![[0.0; 3]; n as usize],
+            pairs: &pairs,
+            arcs: &arcs,
+        };
+        let cost = Cost {
+            arcs: 1.0,
+            means: 0.0,
+            small: 0.0,
+        };
+        let tree = merge(&graph, cost, 1e9, &Monitor::default()).unwrap();
+        // The weakest borders go first.
+        let order: Vec<u32> = tree.parts.iter().map(|&[p, q]| p.min(q) * 37 % n).collect();
+        assert_eq!(order[1..], (2..n).collect::<Vec<u32>>());
+        let stopped = Monitor::default();
+        stopped.cancel();
+        assert!(merge(&graph, cost, 1e9, &stopped).is_err());
     }
 }

@@ -10,6 +10,7 @@ pub mod candidates;
 pub mod measure;
 pub mod merge;
 
+use crate::foundation::memory;
 use crate::{Error, Result};
 
 /// Sets of regions.
@@ -48,9 +49,23 @@ impl Sets {
     }
 
     /// Adds a set.
-    pub fn push(&mut self, members: impl IntoIterator<Item = u32>) {
-        self.members.extend(members);
+    ///
+    /// # Errors
+    /// Memory is short.
+    pub fn push(&mut self, members: &[u32]) -> Result<()> {
+        let room = self.members.capacity();
+        if room - self.members.len() < members.len() {
+            // The capacity at least doubles. Leave as much again for the rest of the work.
+            memory::room("sets of regions", room.max(members.len()), 16)?;
+        }
+        self.members.extend_from_slice(members);
         self.starts.push(self.members.len());
+        Ok(())
+    }
+
+    /// Returns the starts of all sets and the end of the last one, and the members of all sets.
+    pub fn into_parts(self) -> (Vec<usize>, Vec<u32>) {
+        (self.starts, self.members)
     }
 
     /// Number of sets.
@@ -66,16 +81,6 @@ impl Sets {
     /// Returns the members of a set.
     pub fn get(&self, i: usize) -> &[u32] {
         &self.members[self.starts[i]..self.starts[i + 1]]
-    }
-
-    /// Starts of all sets, and the end of the last one.
-    pub fn starts(&self) -> &[usize] {
-        &self.starts
-    }
-
-    /// Members of all sets.
-    pub fn members(&self) -> &[u32] {
-        &self.members
     }
 
     /// Returns a number above all members.
@@ -108,7 +113,7 @@ impl Graph<'_> {
         self.area.is_empty()
     }
 
-    /// Returns an error if the sizes of the arrays do not match.
+    /// Returns an error if the sizes of the arrays do not match or a value is out of range.
     pub(crate) fn check(&self) -> Result<()> {
         let n = self.len();
         if self.mean.len() != n {
@@ -125,6 +130,11 @@ impl Graph<'_> {
             );
             return Err(Error::value("arcs", message));
         }
+        if self.area.iter().any(|&a| !(a.is_finite() && a > 0.0)) {
+            return Err(Error::value("area", "must be finite and above 0"));
+        }
+        check_finite("mean", self.mean.as_flattened())?;
+        check_finite("arcs", self.arcs.as_flattened())?;
         check_pairs(self.pairs, n)
     }
 
@@ -136,6 +146,14 @@ impl Graph<'_> {
             out[q as usize].push(p);
         }
         out
+    }
+}
+
+/// Returns an error if a value is not finite.
+pub(crate) fn check_finite(argument: &'static str, values: &[f64]) -> Result<()> {
+    match values.iter().find(|v| !v.is_finite()) {
+        Some(bad) => Err(Error::value(argument, format!("must be finite, got {bad}"))),
+        None => Ok(()),
     }
 }
 

@@ -23,6 +23,11 @@ const UNIT: f32 = 65536.0;
 const FIXED: i32 = 1 << 28;
 /// Maximum evidence and price. Larger values are clipped.
 const MOST: f32 = 64.0;
+/// Regions are cut together while their windows have less than this number of times the pixels of the image. The limit
+/// bounds the memory for the pixels that many overlapping regions claim. It has no influence on the result.
+const TOGETHER: usize = 4;
+/// Bytes for each pixel of a window while its region is cut.
+const CUT: usize = 112;
 
 /// Data that determine the new outlines.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +42,7 @@ pub struct Evidence<'a> {
 }
 
 /// Returns labels with new outlines. 0 is the background. The outline of label `i` moves by at most `reach[i]` pixels,
-/// and not at all if that is 0.
+/// and not at all if that is 0. Then only the largest part of a label is kept, and its holes are filled.
 ///
 /// # Errors
 /// Sizes of arrays differ, a label is out of range, a reach exceeds 64, a value is not finite, or a price is negative.
@@ -58,8 +63,12 @@ pub fn refine(
         let message = format!("must be from 0 to below {}, got {bad}", reach.len().max(1));
         return Err(Error::value("labels", message));
     }
-    if evidence.inside.iter().any(|v| !v.is_finite()) || !evidence.pull.is_finite() {
+    if evidence.inside.iter().any(|v| !v.is_finite()) {
         return Err(Error::value("inside", "must be finite"));
+    }
+    if !evidence.pull.is_finite() {
+        let message = format!("must be finite, got {}", evidence.pull);
+        return Err(Error::value("pull", message));
     }
     if evidence.price.iter().any(|v| !(v.is_finite() && *v >= 0.0)) {
         return Err(Error::value("price", "must be finite and at least 0"));
@@ -70,31 +79,56 @@ pub fn refine(
             format!("must be at most 64, got {bad}"),
         ));
     }
-    memory::room("outlines", labels.len(), 12)?;
+    if u32::try_from(labels.len()).is_err() {
+        return Err(Error::value("labels", "must have less than 2^32 pixels"));
+    }
+    memory::room("outlines", labels.len(), 8)?;
+    memory::room("outlines", reach.len(), 160)?;
     monitor.check()?;
-    let boxes = boxes(labels, shape, reach.len());
-    let claims = par::map(boxes.len(), |i| {
-        let Some(area) = boxes[i].filter(|_| i > 0) else {
-            return Ok(Vec::new());
-        };
-        Band::new(labels, shape, area, i as i32, reach[i]).cut(evidence, monitor)
-    });
+    let windows: Vec<(usize, Window)> = boxes(labels, shape, reach.len())
+        .into_iter()
+        .enumerate()
+        .filter_map(|(i, area)| Some((i, Window::new(area?, shape, reach[i]))))
+        .collect();
     // If several regions claim a pixel, assign it to its first region, or else to the nearest region. Ties go to the
     // lowest label.
     let mut out = vec![0i32; labels.len()];
     let mut best = vec![f32::NEG_INFINITY; labels.len()];
-    for (i, claims) in claims.into_iter().enumerate() {
-        for (p, depth) in claims? {
-            let p = p as usize;
-            let own = labels[p] == i as i32;
-            let depth = if own { f32::INFINITY } else { depth };
-            if depth > best[p] {
-                best[p] = depth;
-                out[p] = i as i32;
+    let mut left = &windows[..];
+    while !left.is_empty() {
+        let (now, later) = left.split_at(together(left, TOGETHER * labels.len()));
+        left = later;
+        let largest = now.iter().map(|(_, w)| w.pixels()).max().unwrap_or(0);
+        let claimed: usize = now.iter().map(|(_, w)| w.pixels()).sum();
+        let cuts = now.len().min(par::threads());
+        memory::room("outlines", CUT * cuts * largest + 8 * claimed, 1)?;
+        let claims = par::map(now.len(), |k| {
+            let (i, window) = now[k];
+            Band::new(labels, shape[1], window, i as i32, reach[i]).cut(evidence, monitor)
+        });
+        for (&(i, _), claims) in now.iter().zip(claims) {
+            for (p, depth) in claims? {
+                let p = p as usize;
+                let own = labels[p] == i as i32;
+                let depth = if own { f32::INFINITY } else { depth };
+                if depth > best[p] {
+                    best[p] = depth;
+                    out[p] = i as i32;
+                }
             }
         }
     }
     Ok(out)
+}
+
+/// Returns how many of the first windows have at most `most` pixels together, at least 1.
+fn together(windows: &[(usize, Window)], most: usize) -> usize {
+    let mut sum = 0;
+    let fits = |(_, window): &&(usize, Window)| {
+        sum += window.pixels();
+        sum <= most
+    };
+    windows.iter().take_while(fits).count().max(1)
 }
 
 /// First and last row and column.
@@ -115,10 +149,33 @@ fn boxes(labels: &[i32], [_, columns]: [usize; 2], count: usize) -> Vec<Option<B
     out
 }
 
-/// The surroundings of one region.
-struct Band {
+/// The rectangle around a region that its new outline may reach.
+#[derive(Debug, Clone, Copy)]
+struct Window {
     origin: [usize; 2],
     shape: [usize; 2],
+}
+
+impl Window {
+    fn new([ys, xs]: Box2, [rows, columns]: [usize; 2], reach: u8) -> Self {
+        let margin = usize::from(reach) + 2;
+        let origin = [ys[0].saturating_sub(margin), xs[0].saturating_sub(margin)];
+        let end = [
+            (ys[1] + margin + 1).min(rows),
+            (xs[1] + margin + 1).min(columns),
+        ];
+        let shape = [end[0] - origin[0], end[1] - origin[1]];
+        Self { origin, shape }
+    }
+
+    fn pixels(&self) -> usize {
+        self.shape[0] * self.shape[1]
+    }
+}
+
+/// The surroundings of one region.
+struct Band {
+    window: Window,
     columns: usize,
     reach: u8,
     /// Distance of each pixel from the first outline, positive inside.
@@ -128,24 +185,12 @@ struct Band {
 }
 
 impl Band {
-    fn new(
-        labels: &[i32],
-        [rows, columns]: [usize; 2],
-        [ys, xs]: Box2,
-        label: i32,
-        reach: u8,
-    ) -> Self {
-        let margin = usize::from(reach) + 2;
-        let origin = [ys[0].saturating_sub(margin), xs[0].saturating_sub(margin)];
-        let end = [
-            (ys[1] + margin + 1).min(rows),
-            (xs[1] + margin + 1).min(columns),
-        ];
-        let shape = [end[0] - origin[0], end[1] - origin[1]];
-        let mut own = Vec::with_capacity(shape[0] * shape[1]);
-        let mut alien = Vec::with_capacity(shape[0] * shape[1]);
-        for y in origin[0]..end[0] {
-            for &l in &labels[y * columns + origin[1]..y * columns + end[1]] {
+    fn new(labels: &[i32], columns: usize, window: Window, label: i32, reach: u8) -> Self {
+        let Window { origin, shape } = window;
+        let mut own = Vec::with_capacity(window.pixels());
+        let mut alien = Vec::with_capacity(window.pixels());
+        for y in origin[0]..origin[0] + shape[0] {
+            for &l in &labels[y * columns + origin[1]..][..shape[1]] {
                 own.push(l == label);
                 alien.push(l != label && l != 0);
             }
@@ -159,8 +204,7 @@ impl Band {
             alien
         };
         Self {
-            origin,
-            shape,
+            window,
             columns,
             reach,
             depth,
@@ -170,9 +214,9 @@ impl Band {
 
     /// Returns the index and the depth of each pixel inside the new outline.
     fn cut(&self, evidence: &Evidence<'_>, monitor: &Monitor) -> Result<Vec<(u32, f32)>> {
-        let [rows, columns] = self.shape;
-        let place =
-            |i: usize| (self.origin[0] + i / columns) * self.columns + self.origin[1] + i % columns;
+        let [rows, columns] = self.window.shape;
+        let origin = self.window.origin;
+        let place = |i: usize| (origin[0] + i / columns) * self.columns + origin[1] + i % columns;
         let mut inside: Vec<bool> = self.depth.iter().map(|&d| d > 0.0).collect();
         if self.reach > 0 {
             let reach = f32::from(self.reach);
@@ -210,15 +254,15 @@ impl Band {
             inside = cut.sink.iter().map(|&s| !s).collect();
         }
         self.tidy(&mut inside);
-        let claims = inside.iter().enumerate().filter(|(_, flag)| **flag);
-        Ok(claims
-            .map(|(i, _)| (place(i) as u32, self.depth[i]))
-            .collect())
+        let mut claims = Vec::with_capacity(inside.iter().filter(|&&flag| flag).count());
+        let claimed = inside.iter().enumerate().filter(|(_, flag)| **flag);
+        claims.extend(claimed.map(|(i, _)| (place(i) as u32, self.depth[i])));
+        Ok(claims)
     }
 
     /// Keeps the largest connected part, and fills holes that are not deep in another region.
     fn tidy(&self, inside: &mut [bool]) {
-        let parts = parts(inside, self.shape, |_| false);
+        let parts = parts(inside, self.window.shape, |_| false);
         let largest = parts
             .1
             .iter()
@@ -230,12 +274,12 @@ impl Band {
             .zip(&parts.0)
             .for_each(|(flag, &part)| *flag = part == largest as u32);
         let outside: Vec<bool> = inside.iter().map(|flag| !flag).collect();
-        let [rows, columns] = self.shape;
+        let [rows, columns] = self.window.shape;
         let edge = |i: usize| {
             let (y, x) = (i / columns, i % columns);
             y == 0 || x == 0 || y + 1 == rows || x + 1 == columns || self.other[i]
         };
-        let holes = self::parts(&outside, self.shape, edge);
+        let holes = self::parts(&outside, self.window.shape, edge);
         for (flag, &part) in inside.iter_mut().zip(&holes.0) {
             // Parts that touch the edge of the window, or pixels deep in another region, have size 0. They are not
             // holes.
@@ -445,6 +489,22 @@ mod tests {
             )
             .is_err()
         );
+        let pull = f32::INFINITY;
+        let error = refine(&[0, 1, 0, 0], &Evidence { pull, ..evidence }).unwrap_err();
+        assert!(error.to_string().starts_with("pull"));
         assert_eq!(refine(&[1; 4], &evidence).unwrap(), [1; 4]);
+    }
+
+    #[test]
+    fn regions_whose_windows_overlap_are_cut_in_several_groups() {
+        // Each of 900 regions has one pixel, and its window is most of the image.
+        let labels: Vec<i32> = (1..=900).collect();
+        let evidence = Evidence {
+            inside: &[0.0; 900],
+            price: &[1.0; 900],
+            pull: 1.0,
+        };
+        let found = refine(&labels, [30, 30], &evidence, &[9; 901], &Monitor::default());
+        assert_eq!(found.unwrap(), labels);
     }
 }
