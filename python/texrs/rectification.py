@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_work, guidance
+from texrs._arrays import as_choice, as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_work, guidance
 from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs._verbs import takes_materials
@@ -134,6 +134,7 @@ def rectify(
     cyclic, number = as_wrap(wrap, usual=False), as_seed(seed)
     asked = None if size is None else as_size(size, minimum=SMALLEST)
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
+    as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
     check_work("rectify", [pixels], asked or pixels.shape[:2], "image" if asked is None else "size")
     watch("plane", 0.0)
     with answering(progress, "plane", 0.0):

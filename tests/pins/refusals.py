@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +34,16 @@ class Begun(BaseException):
     """The arguments were accepted, and the work has begun."""
 
 
-def begin(stage: str, share: float) -> None:
-    """Stop a verb at its first report of progress."""
-    raise Begun
+def stop_work() -> Callable[[str, float], None]:
+    """Return a progress function that stops a verb after its first stage has begun, which contains checks."""
+    stages: list[str] = []
+
+    def report(stage: str, share: float) -> None:
+        stages.append(stage)
+        if share > 0 or stage != stages[0]:
+            raise Begun
+
+    return report
 
 
 def list_values(parameter: inspect.Parameter, valid: object) -> Iterator[tuple[str, object]]:
@@ -57,7 +64,7 @@ def answer(call: hostile.Call, name: str, value: object) -> str:
     given = call.arguments | {name: value}
     progress = inspect.signature(call.function).parameters.get("progress")
     if progress is not None and "bool" in str(progress.annotation) and name != "progress":
-        given["progress"] = begin
+        given["progress"] = stop_work()
     try:
         with texrs.limits.context(pixels=2**18, voxels=2**18), np.errstate(all="ignore"):
             call.call(given)
