@@ -30,6 +30,7 @@ from texrs._arrays import as_image, as_rgb, guidance
 from texrs._progress import ask
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar import Exemplar
+from texrs.exemplar.regularity import correlate
 from texrs.metrics import Seam, find_breaks, find_seam, list_neighbours, measure_salience, measure_use
 from texrs.source_map import SourceMap
 
@@ -39,8 +40,6 @@ CELL, ORIENTATIONS = 8, 6
 """Side of the cells whose energies are compared, in pixels, and number of orientations of the filters."""
 REACH, FAR, PEAKS, PEAK = 0.7, 96, 12, 0.15
 """Largest shift of the autocorrelation, as a share of the side and in pixels; number and least height of its peaks."""
-OVERLAP = 0.15
-"""Least overlap of the image and its shifted copy, as a share of the image."""
 LINE, USUAL = 85, 95
 """Percentile of gradients above which a pixel is on a line, and percentile of the exemplar's values as a limit of faults.
 """
@@ -196,7 +195,7 @@ class Judge:
         """Return the share of the peaks' height that a texture lacks. Each is looked for around its place."""
         if not len(self.peaks):
             return 0.0
-        found, lost = correlate(light, self.reach), 0.0
+        found, lost = correlate_fine(light, self.reach), 0.0
         for (row, column), height in zip(self.peaks, self.heights, strict=True):
             near = 2 + int(0.06 * np.hypot(row, column - self.reach[1]))
             around = found[max(0, row - near) : row + near + 1, max(0, column - near) : column + near + 1]
@@ -222,23 +221,14 @@ def split_colours(colours: Floats) -> Floats:
     return np.stack([(red + green + blue) / 3, (red - green) / 2, (red + green - 2 * blue) / 4])
 
 
-def correlate(light: Floats, reach: tuple[int, int]) -> Floats:
+def correlate_fine(light: Floats, reach: tuple[int, int]) -> Floats:
     """Return the correlation of an image with itself, without its slow changes.
 
-    Rows are shifts from 0, columns are shifts from ``-reach`` to ``reach``. Each shift is divided by the deviations of
-    both overlapping parts, so that shifts above half of an image are comparable.
+    Rows are shifts from 0, columns are shifts from ``-reach`` to ``reach``.
     """
-    from scipy import fft, ndimage
+    from scipy.ndimage import gaussian_filter
 
-    x = np.asarray(light - ndimage.gaussian_filter(light, max(reach) / 3), np.float64)
-    size = [fft.next_fast_len(2 * n, real=True) for n in x.shape]
-    picture, ones, squares = (fft.rfft2(v, size) for v in (x, np.ones_like(x), x * x))
-    product, overlap = (fft.irfft2(v * np.conj(v), size) for v in (picture, ones))
-    first, second = (fft.irfft2(v, size) for v in (squares * np.conj(ones), ones * np.conj(squares)))
-    found = product / np.sqrt(np.maximum(first * second, 1e-12))
-    found[overlap < OVERLAP * x.size] = 0
-    shifts = np.concatenate([found[:, -reach[1] :], found[:, : reach[1] + 1]], axis=1)[: reach[0] + 1]
-    return np.asarray(shifts, np.float32)
+    return correlate(light - gaussian_filter(light, max(reach) / 3), reach)[reach[0] :]
 
 
 def find_peaks(light: Floats) -> tuple[NDArray[np.intp], Floats, tuple[int, int]]:
@@ -246,7 +236,7 @@ def find_peaks(light: Floats) -> tuple[NDArray[np.intp], Floats, tuple[int, int]
     from scipy.ndimage import maximum_filter
 
     rows, columns = (max(1, min(int(REACH * n), FAR)) for n in light.shape)
-    found = correlate(light, (rows, columns))
+    found = correlate_fine(light, (rows, columns))
     at = np.argwhere((found == maximum_filter(found, 7)) & (found > PEAK))
     # The peak at no shift has the width of a few pixels.
     at = at[np.hypot(at[:, 0], at[:, 1] - columns) > 5]

@@ -33,6 +33,8 @@ WINDOW = 512
 """Side of the central part of an image that is analysed, in pixels."""
 REACH, FAR_REACH = 0.45, 0.7
 """Maximum shifts, as shares of a side. Longer shifts are only used if the lattice of shorter ones is doubtful."""
+STRIP = 32
+"""Number of lines that are transformed at once. It has no influence on the result."""
 OVERLAP = 0.15
 """Minimum overlap of an image and its shifted copy, as a share of the image."""
 SHORTEST, PEAKS = 6, 8
@@ -286,10 +288,12 @@ def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
     for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
         ask()
         level = level_light(picture)
-        near = _fit_lattice(correlate(level, as_reach(level.shape, REACH), whole=True), level.shape, REGULAR, 0.0)
+        reaches = [as_reach(level.shape, share) for share in (REACH, FAR_REACH if far else REACH)]
+        products = sum_products(level, reaches[1])
+        near = _fit_lattice(correlate(level, reaches[0], whole=True, products=products), level.shape, REGULAR, 0.0)
         wide = None
         if far:
-            wide = _fit_lattice(correlate(level, as_reach(level.shape, FAR_REACH)), level.shape, FAR_REGULAR, CHANCE)
+            wide = _fit_lattice(correlate(level, reaches[1], products=products), level.shape, FAR_REGULAR, CHANCE)
         # Short vectors of a coarse lattice join similar parts of its cell.
         better = wide is not None and (near is None or near.correlation < DOUBTED * wide.correlation)
         found.append(wide if better else near)
@@ -320,31 +324,59 @@ def as_reach(shape: tuple[int, ...], share: float) -> tuple[int, int]:
     return int(share * shape[0]), int(share * shape[1])
 
 
-def correlate(picture: Floats, reach: tuple[int, int], *, whole: bool = False) -> Floats:
+def correlate(
+    picture: Floats, reach: tuple[int, int], *, whole: bool = False, products: NDArray[np.float64] | None = None
+) -> Floats:
     """Return the autocorrelation of an image for shifts up to a number of rows and columns.
 
     The zero shift is in the middle. Each shift is divided by the deviations of both overlapping parts, so that shifts
     above half of an image are comparable. With ``whole``, it is divided by the deviation of the whole image, which is
-    steadier for short shifts. The correlation is 0 if too small a part overlaps.
+    steadier for short shifts. The correlation is 0 if too small a part overlaps. ``products`` are those of
+    `sum_products`, for this reach or a larger one, if they are known.
     """
-    from scipy.fft import irfft2, next_fast_len, rfft2
-
-    # Use double precision, because single-precision transforms differ in their last bits between processors.
-    values = picture.astype(np.float64)
-    size = [next_fast_len(2 * n, real=True) for n in picture.shape]
-    spectrum = rfft2(values, size)
-    found, (rows, columns) = irfft2(spectrum.real**2 + spectrum.imag**2, size), reach
     overlap = measure_overlap(picture.shape, reach)
-    if not whole:
-        squares, ones = (rfft2(v, size) for v in (values**2, np.ones_like(values)))
-        first = irfft2(squares * np.conj(ones), size)
-        # The part that a shift moves onto another one is the other part of the opposite shift.
-        second = np.roll(first[::-1, ::-1], (1, 1), (0, 1))
-        found /= np.sqrt(np.maximum(first * second, 1e-12))
-    near = np.roll(found, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
+    squares = picture.astype(np.float64) ** 2
+    found = sum_products(picture, reach) if products is None else products
+    top, left = ((n - near) // 2 for n, near in zip(found.shape, overlap.shape, strict=True))
+    found = found[top : top + len(overlap), left : left + overlap.shape[1]]
     if whole:
-        near = near / (overlap * values.size) / max(float((values**2).mean()), 1e-12)
-    return np.asarray(np.where(overlap < OVERLAP, 0, near), np.float32)
+        found = found / (overlap * squares.size) / max(float(squares.mean()), 1e-12)
+    else:
+        # Sums over all rectangles that overlap the shifted image, from the sums above and to the left of each pixel.
+        sums = np.pad(squares.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+        low, high = zip(*(_find_overlap(n, r) for n, r in zip(picture.shape, reach, strict=True)), strict=True)
+        first = sums[np.ix_(*high)] - sums[np.ix_(low[0], high[1])] - sums[np.ix_(high[0], low[1])] + sums[np.ix_(*low)]
+        # The part that a shift moves onto another one is the other part of the opposite shift.
+        found = found / np.sqrt(np.maximum(first * first[::-1, ::-1], 1e-12))
+    return np.asarray(np.where(overlap < OVERLAP, 0, found), np.float32)
+
+
+def _find_overlap(count: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first pixel of the part of a line that overlaps each shifted copy, and the end of this part."""
+    shifts = np.arange(-reach, reach + 1)
+    return np.maximum(shifts, 0), np.minimum(shifts, 0) + count
+
+
+def sum_products(picture: Floats, reach: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the sums of the products of an image and its copies, shifted by up to a number of rows and columns.
+
+    The transforms are computed in strips of `STRIP` lines to save memory.
+    """
+    from scipy.fft import fft, ifft, irfft, next_fast_len, rfft
+
+    size = [next_fast_len(n + r, real=True) for n, r in zip(picture.shape, reach, strict=True)]
+    rows, columns = (np.arange(-r, r + 1) for r in reach)
+    # Use double precision, because single-precision transforms differ in their last bits between processors.
+    across = rfft(picture.astype(np.float64), size[1])
+    spectrum = np.empty((len(rows), across.shape[1]), np.complex128)
+    for start in range(0, across.shape[1], STRIP):
+        strip = fft(across[:, start : start + STRIP], size[0], axis=0)
+        spectrum[:, start : start + STRIP] = ifft(strip.real**2 + strip.imag**2, axis=0)[rows]
+    del across
+    found = np.empty((len(rows), len(columns)))
+    for start in range(0, len(rows), STRIP):
+        found[start : start + STRIP] = irfft(spectrum[start : start + STRIP], size[1])[:, columns]
+    return found
 
 
 def measure_overlap(shape: tuple[int, ...], reach: tuple[int, int]) -> NDArray[np.float64]:
