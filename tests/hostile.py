@@ -200,6 +200,7 @@ def list_hostile(valid: object) -> Iterator[object]:
 SOLID = "texrs.SolidTexture(texrs.samples.stripes((32, 32, 32)).image, quality='fast')"
 TILES = "texrs.CornerTiles(texrs.samples.pebbles((96, 96)).image, 32)"
 MAPS = "texrs.Material({'albedo': texrs.samples.stripes((32, 32, 32)).image}, axes=3)"
+FINDER, LABELS = "texrs.exemplar.element_finder", "numpy.zeros((9, 10), numpy.int32)"
 EXAMPLES = {
     "texrs.SolidTexture.window": f"{SOLID}.window((-3, 4, 5), (6, 7, 8))",
     "texrs.SolidTexture.estimate_memory": f"{SOLID}.estimate_memory(64)",
@@ -217,6 +218,8 @@ EXAMPLES = {
     "texrs.TextureDatabase.__getitem__": "texrs.TextureDatabase('base')['rock']",
     "texrs.TextureDatabase.__contains__": "'rock' in texrs.TextureDatabase('base')",
     "texrs.exemplar.Analysis": "texrs.exemplar.Analysis(texrs.Exemplar(texrs.samples.dots((32, 32)).image).analyse().levels)",
+    "texrs.exemplar.element_finder.Element": f"{FINDER}.Element((1.5, 2.5), 0.0, 1.0, 24, 0.9, False)",
+    "texrs.exemplar.element_finder.FoundElements": f"{FINDER}.FoundElements({LABELS}, (), 'none', 0.9, {{'none': 0.9}})",
 }
 """Calls that are not in the examples of the documentation, mostly of methods that classes share."""
 

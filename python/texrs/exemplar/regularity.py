@@ -244,6 +244,11 @@ class Lattice:
         str
             The sentence, as part of a longer one.
 
+        Raises
+        ------
+        InvalidInput
+            The vectors are parallel.
+
         Examples
         --------
         >>> from texrs.exemplar import Lattice

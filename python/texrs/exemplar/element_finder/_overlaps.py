@@ -33,6 +33,14 @@ class Overlap:
     confidence : float
         Probability that the order is right, 0.5 to 1.
 
+    Examples
+    --------
+    The first element lies on the third one:
+
+    >>> from texrs.exemplar.element_finder import Overlap
+    >>> Overlap(above=0, below=2, confidence=0.9).confidence
+    0.9
+
     """
 
     above: int
