@@ -188,7 +188,7 @@ def merge_regions(
     progress: Callable[[float], object] | None,
 ) -> NDArray[int32]: ...
 def quilt(
-    pictures: Sequence[tuple[NDArray[float32], Sequence[Sequence[float]] | None]],
+    pictures: Sequence[tuple[NDArray[float32], Sequence[Sequence[float]] | None, Sequence[float]]],
     pixels: tuple[NDArray[uint16], NDArray[float32], NDArray[bool_], NDArray[uint32]],
     samples: PatchSamples,
     options: tuple[Sequence[int], Sequence[bool], Sequence[int], bool, int | None],

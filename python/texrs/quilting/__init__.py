@@ -17,6 +17,7 @@ Departures from the paper, with their reasons:
   fuses similar elements such as coins and olives.
 - If the texture has a lattice, all overlapping pixels that differ also add to the cost of a patch. A seam through
   plain background would not show that the patch does not match the lattice.
+- On a lattice, patches are placed in step with it, also those of mirror images, unless they fit much worse there.
 - A patch costs more if it uses samples that other patches already use, or if it continues exactly where a neighbour
   ends. This cost is added to that of the match. If it were a factor, the total of an exact continuation would be zero,
   and the continuation would always win.

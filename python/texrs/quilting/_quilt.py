@@ -19,6 +19,8 @@ COLOUR, DEPTH = 1.0, 1.0
 """Weights of a seam's cost: squared colour differences, and depth of its pixels inside elements."""
 CELL = 8
 """Side of the square cells of the exemplar for which uses are counted, in pixels."""
+FOLDED = 24
+"""Number of points along each side of an averaged cell of a lattice. They are at most half a joint apart."""
 CALM, RUN = 64, 9
 """Number of lines among which a calm line is chosen, and length in pixels of the pieces of a line that are averaged.
 """
@@ -78,7 +80,11 @@ def stitch(
     window, picture, corner = first
     return _rust.quilt(
         [
-            (np.ascontiguousarray(p.colours), None if p.lattice is None else np.asarray(p.lattice, float).tolist())
+            (
+                np.ascontiguousarray(p.colours),
+                None if p.lattice is None else np.asarray(p.lattice, float).tolist(),
+                find_phase(pictures[0], p),
+            )
             for p in pictures
         ],
         (
@@ -93,6 +99,34 @@ def stitch(
         [[each.pack() for each in wave] for wave in waves],
         progress,
     )
+
+
+def find_phase(first: Picture, other: Picture) -> tuple[float, float]:
+    """Return the position in an image that shows the same part of the lattice as the origin of the first image.
+
+    Mirror images of one lattice fit each other only at such positions. Both images are averaged over all cells of the
+    lattice, and the averages are compared at all shifts.
+    """
+    if first.lattice is None or other.lattice is None or other is first:
+        return (0.0, 0.0)
+    one, two = (average_cells(p.colours, first.lattice) for p in (first, other))
+    spectra = [np.fft.fft2(cell - cell.mean((0, 1)), axes=(0, 1)) for cell in (one, two)]
+    likeness = np.fft.ifft2((spectra[0].conj() * spectra[1]).sum(axis=2)).real
+    best = np.unravel_index(int(np.argmax(likeness.round(6))), likeness.shape)
+    shift = np.asarray(first.lattice, float) @ (np.array(best) / FOLDED)
+    return (float(shift[0]), float(shift[1]))
+
+
+def average_cells(colours: Floats, lattice: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of all cells of a lattice, on a grid of `FOLDED` points along each of its vectors."""
+    rows, columns = np.indices(colours.shape[:2])
+    inverse = np.linalg.inv(np.asarray(lattice, float))
+    along = (np.floor(FOLDED * (v[0] * rows + v[1] * columns)).astype(np.int64) % FOLDED for v in inverse)
+    cell = np.ravel_multi_index(tuple(along), (FOLDED, FOLDED)).ravel()
+    # A point that no pixel is nearest to gets the mean colour.
+    count, planes = np.bincount(cell, minlength=FOLDED**2) + 1e-6, np.moveaxis(colours, -1, 0).astype(np.float64)
+    means = [(np.bincount(cell, p.ravel(), FOLDED**2) + 1e-6 * p.mean()) / count for p in planes]
+    return np.stack(means, axis=-1).reshape(FOLDED, FOLDED, -1)
 
 
 def finish(

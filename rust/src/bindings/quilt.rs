@@ -9,8 +9,8 @@ use super::{grouped, run};
 use crate::engine::quilt::{Options, Picture, Pixels, Quilt, Span, Window};
 use crate::foundation::memory;
 
-/// Colours, and the lattice if there is one.
-type PictureIn<'py> = (PyReadonlyArray3<'py, f32>, Option<[[f64; 2]; 2]>);
+/// Colours, the lattice if there is one, and the phase.
+type PictureIn<'py> = (PyReadonlyArray3<'py, f32>, Option<[[f64; 2]; 2]>, [f64; 2]);
 /// Exemplar, coordinates, mirror flag and cell of each pixel.
 type PixelsIn<'py> = (
     PyReadonlyArray1<'py, u16>,
@@ -41,11 +41,12 @@ pub(super) fn quilt<'py>(
 ) -> PyResult<QuiltOut<'py>> {
     // Copy the arrays, because the kernel runs without the interpreter lock.
     let mut all = Vec::with_capacity(pictures.len());
-    for (colours, lattice) in &pictures {
+    for (colours, lattice, phase) in &pictures {
         all.push(Picture {
             colours: memory::copied("pictures", colours.as_slice()?)?,
             shape: [colours.shape()[0], colours.shape()[1]],
             lattice: *lattice,
+            phase: *phase,
         });
     }
     let (exemplar, coordinates, hands, cells) = &pixels;

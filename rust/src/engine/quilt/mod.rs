@@ -43,6 +43,8 @@ pub struct Picture {
     pub shape: [usize; 2],
     /// The lattice that the image repeats on, if the texture keeps it. Each column is a shift (row, column).
     pub lattice: Option<[[f64; 2]; 2]>,
+    /// Position in the image that corresponds to the origin of the first image, up to shifts of the lattice.
+    pub phase: [f64; 2],
 }
 
 /// Properties of the pixels of all images, concatenated.
@@ -91,6 +93,8 @@ pub struct Quilt<'a> {
     /// Number of patches that show each cell.
     used: Vec<u32>,
     pastes: u32,
+    /// Offset from the origin of the first image to its place in the texture, from the first patch.
+    step: Option<[f64; 2]>,
 }
 
 /// Properties of an image except its colours.
@@ -99,8 +103,15 @@ struct Place {
     /// Position of the image's first pixel among the pixels of all images.
     first: usize,
     lattice: Option<[[f64; 2]; 2]>,
-    /// Offset from the place of the first patch in the image to its place in the texture.
-    step: Option<[f64; 2]>,
+    phase: [f64; 2],
+}
+
+impl Place {
+    /// Returns the offset from the origin of the first image to its place in the texture, if a patch begins at a corner.
+    fn moved(&self, corner: [usize; 2], found: &Match) -> [f64; 2] {
+        let at = [found.row, found.column];
+        [0, 1].map(|a| corner[a] as f64 - at[a] as f64 + self.phase[a])
+    }
 }
 
 /// A patch that has been chosen for a window.
@@ -178,7 +189,7 @@ impl<'a> Quilt<'a> {
                 shape: p.shape,
                 first: begin,
                 lattice: p.lattice,
-                step: None,
+                phase: p.phase,
             });
             begin += p.shape[0] * p.shape[1];
             exemplars.push(exemplar(p.colours, p.shape));
@@ -196,6 +207,7 @@ impl<'a> Quilt<'a> {
             label: memory::filled("a quilt", 0, points)?,
             seams: memory::filled("a quilt", [0.0; 2], points)?,
             pastes: 0,
+            step: None,
             options,
         })
     }
@@ -288,10 +300,9 @@ impl<'a> Quilt<'a> {
     /// Copies the pixels of a patch for which `take` is true into the texture.
     fn lay(&mut self, window: &Window, found: &Match, take: impl Fn(usize) -> bool) {
         let corner = window.corner();
-        let step = [found.row, found.column];
-        let step = [0, 1].map(|a| corner[a] as f64 - step[a] as f64);
-        // The first patch of an image fixes the lattice that the others should agree with.
-        self.pictures[found.exemplar].step.get_or_insert(step);
+        // The first patch fixes the lattice that the others should agree with.
+        let moved = self.pictures[found.exemplar].moved(corner, found);
+        self.step.get_or_insert(moved);
         let places: Vec<u32> = self.places(found, 1).collect();
         let points = window.bounds().points(self.options.size);
         for (k, (i, &place)) in points.zip(&places).enumerate() {

@@ -16,8 +16,9 @@ const CONTINUATION: f64 = 2.0;
 /// Maximum deviation of a patch from the lattice, relative to the lattice's shorter shift.
 const IN_STEP: f64 = 0.15;
 /// Maximum cost of the matches that agree with the lattice, relative to the best cost. If a lattice is irregular, the
-/// fit is more important than the lattice.
-const AS_WELL: f64 = 1.3;
+/// fit is more important than the lattice. Of 8 textures, tiles of mixed tones were out of step at 1.3. At 4 all are in
+/// step, and coins in uneven rows stay whole.
+const AS_WELL: f64 = 4.0;
 /// Maximum fraction of the overlap where a patch may show the mirror image of the present content.
 const MIRRORED: f64 = 0.02;
 /// Maximum distance in pixels between two pixels that count as the same place. It equals the side of a cell, because
@@ -164,12 +165,11 @@ fn keep_in_step(
 ) -> Vec<usize> {
     let away = |m: &Match| {
         let picture = &quilt.pictures[m.exemplar];
-        let (Some(lattice), Some(step)) = (&picture.lattice, picture.step) else {
+        let (Some(lattice), Some(step)) = (&picture.lattice, quilt.step) else {
             return 0.0;
         };
-        let at = [m.row, m.column];
-        let moved = [0, 1].map(|a| corner[a] as f64 - at[a] as f64 - step[a]);
-        out_of_step(lattice, moved)
+        let moved = picture.moved(corner, m);
+        out_of_step(lattice, [moved[0] - step[0], moved[1] - step[1]])
     };
     let least = |rows: &[usize]| {
         rows.iter()

@@ -36,6 +36,7 @@ fn picture(seed: u64) -> (Picture, Pixels, Samples) {
         colours,
         shape: [SIDE; 2],
         lattice: None,
+        phase: [0.0; 2],
     };
     (picture, pixels, samples)
 }
