@@ -12,7 +12,7 @@ from reference import quilting as reference
 from texrs import SourceMap, samples
 from texrs.blending import measure_visibility
 from texrs.quilting import Picture, quilt
-from texrs.quilting._quilt import find_calm_lines
+from texrs.quilting._quilt import find_calm_lines, find_phase
 from texrs.quilting._windows import divide_axis, plan_waves
 
 
@@ -217,3 +217,17 @@ def test_waves_are_the_same_for_any_number_of_threads(monkeypatch: pytest.Monkey
     assert (row.coordinates != sources[0].coordinates).any()
     waves, raster = (measure_visibility(s, pebbles, s.render(pebbles), wrap=True) for s in (sources[0], row))
     assert waves.mean < 1.1 * raster.mean
+
+
+def test_the_phase_of_a_shifted_image_is_its_shift():
+    rows, columns = np.indices((72, 96))
+    image = ((rows % 12 < 3) | (columns % 24 < 3)).astype(np.float32)[..., None]
+    lattice = np.diag([12.0, 24.0])
+
+    def picture(colours):
+        return Picture(colours, SourceMap.identity((72, 96)), np.zeros((72, 96), np.float32), True, lattice)
+
+    first = picture(image)
+    assert find_phase(first, first) == (0.0, 0.0)
+    for shift in ((5, 7), (0, 13), (11, 0)):
+        assert find_phase(first, picture(np.roll(image, shift, (0, 1)))) == pytest.approx(shift, abs=1.0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from texrs.kernels.patch_search import Match, PatchIndex
-from texrs.quilting._quilt import COLOUR, DEPTH, mark_hands, number_cells
+from texrs.quilting._quilt import COLOUR, DEPTH, find_phase, mark_hands, number_cells
 from texrs.source_map._pixels import Pixels
 
 FREE = 2**32 - 1
 POOL, CANDIDATES, CELL = (48, 96), 3, 8
 REPETITION, GOOD, ON_LATTICE, CONTINUATION = 10.0, 0.1, 2.5, 2.0
-IN_STEP, AS_WELL, MIRRORED, NEAR = 0.15, 1.3, 0.02, 8.0
+IN_STEP, AS_WELL, MIRRORED, NEAR = 0.15, 4.0, 0.02, 8.0
 
 
 def stitch(pictures, size, wrap, fixed, first, waves, progress):
@@ -44,7 +44,8 @@ class Quilt:
         self.hands = np.concatenate([mark_hands(p.source).ravel() for p in pictures])
         self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
         self.used = np.zeros(int(self.cells.max()) + 1)
-        self.steps = {}
+        self.step = None
+        self.phases = [find_phase(pictures[0], picture) for picture in pictures]
         self.most = [(p.colours.shape[0] - patch[0], p.colours.shape[1] - patch[1]) for p in pictures]
         self.whole = PatchIndex([p.colours for p in pictures], max_patch=patch)
         if fixed is None:
@@ -57,7 +58,8 @@ class Quilt:
 
     def lay(self, window, match, mask=True):
         at, places = index(window, self.size), self.list_places(match, window)
-        self.steps.setdefault(match.exemplar, np.subtract(window.corner, (match.row, match.column)).astype(float))
+        if self.step is None:
+            self.step = self.measure_step(match, window)
         self.place[at] = np.where(mask, places, self.place[at])
         self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
         self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
@@ -136,12 +138,15 @@ class Quilt:
         near = [(match.exemplar, row, column) for row in rows for column in columns]
         return self.whole.best_among(colours, known, candidates=near, separation=0)[0]
 
+    def measure_step(self, match, window):
+        return np.subtract(window.corner, (match.row, match.column)) + self.phases[match.exemplar]
+
     def keep_in_step(self, pool, free, window):
         away = np.zeros(len(free))
         for k, m in enumerate(pool[i] for i in free.tolist()):
             lattice = self.pictures[m.exemplar].lattice
-            if lattice is not None and m.exemplar in self.steps:
-                moved = np.subtract(window.corner, (m.row, m.column)) - self.steps[m.exemplar]
+            if lattice is not None and self.step is not None:
+                moved = self.measure_step(m, window) - self.step
                 around = np.floor(np.linalg.solve(lattice, moved))[:, np.newaxis] + [[0, 0, 1, 1], [0, 1, 0, 1]]
                 rest = np.linalg.norm(moved[:, np.newaxis] - lattice @ around, axis=0).min()
                 away[k] = rest / np.linalg.norm(lattice, axis=0).min()
