@@ -424,16 +424,8 @@ def test_blending_can_be_left_out(designed):
 @pytest.mark.parametrize(
     ("options", "names"),
     [
-        ({"wrap": "xy"}, "wrap"),
-        ({"wrap": True, "screening": -1}, "screening"),
-        ({"wrap": True, "screening": float("nan")}, "screening"),
-        ({"wrap": True, "band": 0}, "band"),
-        ({"wrap": True, "band": 2.5}, "band"),
-        ({"wrap": True, "within": np.ones((3, 3), bool)}, "within"),
         ({"wrap": True, "within": np.zeros((96, 128), bool)}, "within: must mark at least one pixel, got none"),
-        ({"wrap": True, "known": np.ones((3, 3), bool)}, "known"),
         ({"wrap": True, "known": [np.ones((64, 64), bool)] * 2}, "known: must be a mask for each of 1"),
-        ({"wrap": True, "map_type": "height"}, "map_type"),
     ],
 )
 def test_bad_input_names_the_argument(patchwork, exemplar, options, names):

@@ -270,18 +270,13 @@ def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatab
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda db: db.add(DOTS.image), "name: is required for an array"),
-        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: must consist of 1 to 100 letters, digits"),
         (
             lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], layout="disjoint"),
             "name: dots exists already",
         ),
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is not an option"),
         (lambda db: db["nobody"], "name: texture 'nobody' is not in"),
-        (lambda db: db.matrix(cell=3), "cell: must be an integer"),
-        (lambda db: db.matrix([], []), "rows: must contain at least one name"),
         (lambda db: db.matrix(["dots"], ["nobody"]), "name: texture 'nobody' is not in"),
-        (lambda db: db.matrix("dots"), "rows: must be a sequence of names"),
         (lambda db: db.remove("nobody"), "name: texture 'nobody' is not in"),
     ],
 )
@@ -295,8 +290,6 @@ def test_folders_that_are_none(tmp_path: Path, textures: TextureDatabase) -> Non
     for path in (tmp_path / "file", tmp_path / "no" / "such"):
         with pytest.raises(FileError):
             TextureDatabase(path)
-    with pytest.raises(InvalidInput):
-        TextureDatabase(3)  # type: ignore[arg-type]
     (textures.path / "dots.npz").write_bytes(b"")
     (textures.path / "dots.npy").unlink()
     with pytest.raises(FileError, match="its image dots.npy is missing"):

@@ -7,7 +7,6 @@ import texrs
 from reference.look_up import view
 from texrs import DeformationOptions, ElementOptions, samples
 from texrs._arrays import to_unit
-from texrs.errors import InvalidInput
 from texrs.exemplar.symmetry import flip
 from texrs.kernels.inpaint import inpaint
 from texrs.kernels.patch_search import PatchIndex
@@ -239,9 +238,3 @@ def test_layers_by_hand_and_several_exemplars(pebbles):
     assert len(made.report["operations"][0]) == 2
     two = texrs.design([pebbles, 255 - pebbles], 96, copies=1, method="paper")
     assert min(two.report["pixel_counts"]) > 0
-
-
-@pytest.mark.parametrize("method", ["literal", "default", "Paper"])
-def test_an_unknown_method_is_refused(pebbles, method):
-    with pytest.raises(InvalidInput, match="^method"):
-        texrs.design(pebbles, 64, method=method)

@@ -123,7 +123,6 @@ def test_numbers_are_seen_on_their_elements(found: ElementAnalysis) -> None:
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ("drop", "corrections: must be a list of steps, got str"),
         ([{"op": "paint"}], "step 0: 'op' must be one of drop, add"),
         ([{"op": "drop"}], "step 0, drop, needs elements"),
         ([{"op": "drop", "elements": [1], "points": []}], "step 0, drop, has no option points"),

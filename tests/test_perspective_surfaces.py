@@ -98,20 +98,9 @@ def test_coordinates_may_jump_and_end():
     np.testing.assert_allclose(found[known], wanted[known], rtol=0.1, atol=0.1)
 
 
-@pytest.mark.parametrize(
-    ("work", "words"),
-    [
-        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4, 3))), "normals: must contain a surface"),
-        (lambda: scale_maps.jacobians_of_normals(np.zeros((4, 4))), "normals: must be numbers of shape"),
-        (lambda: scale_maps.jacobians_of_normals(make_column(), green="left"), "green: must be one of up, down"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 2))), "coordinates: must contain a surface"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2))), "coordinates: must have at least two rows"),
-        (lambda: scale_maps.jacobians_of_coordinates(np.zeros((4, 4, 3))), "coordinates: must have shape"),
-    ],
-)
-def test_what_is_no_surface_is_refused(work, words):
-    with pytest.raises(InvalidInput, match=words):
-        work()
+def test_what_is_no_surface_is_refused():
+    with pytest.raises(InvalidInput, match="coordinates: must have at least two rows"):
+        scale_maps.jacobians_of_coordinates(np.zeros((1, 4, 2)))
 
 
 # --- textures that lie on them ----------------------------------------------------------------------------------------
@@ -266,14 +255,10 @@ def test_a_column_that_repeats(weave):
         ({"target": "plane:slant=80,fov=90"}, "target: must not contain the horizon, but with slant 80"),
         ({"target": np.zeros((8, 8, 2, 2))}, "target: must have scales of .* 64 of 64 do not"),
         ({"target": np.full((8, 8, 2, 2), np.nan)}, "target: must be finite"),
-        ({"target": np.zeros((8, 8, 3))}, "target: normals: must contain a surface"),
         ({"target": np.zeros((8, 8, 2), np.uint8)}, "target: coordinates .* must be floats"),
-        ({"target": np.ones((8, 8, 3, 3))}, "target: must have shape"),
         ({"target": make_column(8), "method": "paper"}, "method: 'paper' cannot be combined with a surface"),
         ({"scale_map": "plane:slant=x"}, "scale_map: must be plane:slant=DEGREES"),
-        ({"scale_map": "above"}, "scale_map: must be one of auto, front"),
         ({"scale_map": Plane((9, 9), 20)}, "scale_map: a plane must belong to an image of"),
-        ({"fov": 400}, "fov: must be a number between 1 and 170"),
         ({"scale_map": "plane:slant=30", "fov": 40}, "fov: cannot be combined with a plane"),
         ({"scale_map": Plane((128, 128), 30), "fov": 40}, "fov: cannot be combined with a plane"),
     ],

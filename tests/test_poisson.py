@@ -70,9 +70,7 @@ def test_what_flows_in_is_carried_off(masked):
     np.testing.assert_allclose(flow, poisson.solve(np.zeros_like(rows), rows, columns, **options), atol=1e-3)
 
 
-@pytest.mark.parametrize(
-    "wrong", [np.zeros((4, 4), np.float32), np.zeros((4, 4, 1)), np.zeros((4, 8, 1), "f4")[:, ::2]]
-)
+@pytest.mark.parametrize("wrong", [np.zeros((4, 4, 1)), np.zeros((4, 8, 1), "f4")[:, ::2]])
 def test_flows_must_be_writeable_in_place(wrong):
     with pytest.raises(InvalidInput, match="^flow"):
         poisson.spread(wrong)

@@ -12,7 +12,6 @@ import pytest
 
 import texrs
 from texrs._progress import answering, ask, listen, show_lines
-from texrs.errors import InvalidInput
 from texrs.materials import Material
 
 PEBBLES = texrs.samples.pebbles((48, 48)).image
@@ -60,19 +59,6 @@ def test_a_line_is_written_for_each_stage_and_now_and_then():
 def test_nobody_listens_unless_asked():
     assert listen(None) is listen(False) is None
     assert listen(print) is print
-
-
-@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.__name__)
-def test_every_verb_says_what_progress_may_be(verb):
-    few = {
-        "apply": (texrs.SourceMap.identity((32, 32)), STRIPES),
-        "blend": (texrs.SourceMap.identity((32, 32)), STRIPES),
-    }
-    needed = [p for p in inspect.signature(verb).parameters.values() if p.default is p.empty]
-    given = few.get(verb.__name__, (STRIPES,) * len([p for p in needed if p.kind is p.POSITIONAL_OR_KEYWORD]))
-    named = {p.name: True for p in needed if p.kind is p.KEYWORD_ONLY}
-    with pytest.raises(InvalidInput, match="progress: must be True, a function or None, got 3"):
-        verb(*given, **named, progress=3)
 
 
 def test_materials_are_shown_by_one_bar(capsys: pytest.CaptureFixture[str]):

@@ -68,28 +68,9 @@ def test_one_pixel_has_a_scale() -> None:
     assert scale_maps.from_angles(1, 60, 33, fov=60).tolist() == [[1]]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"slant": 86}, r"^slant: must be a number between 0 and 85.0, got 86$"),
-        ({"slant": -1}, r"^slant: .* got -1$"),
-        ({"slant": np.nan}, r"^slant: .* got nan$"),
-        ({"tilt": np.inf}, r"^tilt: .* got inf$"),
-        ({"tilt": "up"}, r"^tilt: must be a number .* got 'up'$"),
-        ({"fov": 180}, r"^fov: must be a number between 1 and 170, got 180$"),
-        ({"slant": 80, "fov": 90}, r"^slant: at 80 degrees the horizon is inside an image with a fov of 90"),
-        ({"shape": (0, 5)}, r"^shape: each side must be at least 1"),
-        ({"shape": (2**20, 2**20)}, r"^shape: .* more than the limit"),
-    ],
-)
-def test_angles_refuse(options: dict, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        scale_maps.from_angles(**({"shape": (20, 30), "slant": 30, "tilt": 90} | options))
-
-
-def test_ratios_below_one_are_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"^ratio: must be a number between 1 and 131, got 0.5$"):
-        scale_maps.slant_for_ratio(0.5)
+def test_angles_refuse() -> None:
+    with pytest.raises(InvalidInput, match="^slant: at 80 degrees the horizon is inside an image with a fov of 90"):
+        scale_maps.from_angles((20, 30), 80, 90, fov=90)
 
 
 # --- other sizes -------------------------------------------------------------------------------------------------------
@@ -138,15 +119,11 @@ def test_user_and_angles_do_not_need_a_map() -> None:
 @pytest.mark.parametrize(
     ("arguments", "options", "message"),
     [
-        ((FLOOR, (5, 5), "tile"), {}, r"^mode: must be one of stretch, extend, user, angles; got 'tile'$"),
         ((FLOOR, (5, 5), "user"), {}, r"^pattern: the mode 'user' requires an array of scales$"),
         ((FLOOR, (5, 5), "angles"), {"slant": 4}, r"^tilt: the mode 'angles' requires a slant and a tilt$"),
-        ((FLOOR, (5, 0)), {}, r"^size: each side must be at least 1"),
         ((FLOOR - 5, (5, 5)), {}, r"^scale: \d+ of 4800 scales are outside 0.001 to 1000"),
         ((np.zeros((4, 4)), (5, 5)), {}, r"^scale: 16 of 16 scales are outside"),
-        ((np.full((4, 4), np.nan), (5, 5)), {}, r"^scale: must be finite, but 16 of 16 values are NaN or infinite"),
         ((np.full((4, 4), 128, np.uint8), (5, 5)), {}, r"^scale: must be floats, got uint8; convert"),
-        ((np.ones((4, 4, 3)), (5, 5)), {}, r"^scale: must have shape \(rows, columns\), got \(4, 4, 3\)"),
         ((FLOOR, (5, 5), "user"), {"pattern": np.ones(4)}, r"^pattern: must have shape \(rows, columns\)"),
     ],
 )
@@ -201,9 +178,6 @@ def test_one_known_pixel_is_enough() -> None:
 @pytest.mark.parametrize(
     ("scale", "known", "message"),
     [
-        (FLOOR, np.zeros(FLOOR.shape, bool), r"^known: must mark at least one pixel, got none$"),
-        (FLOOR, np.ones((5, 5), bool), r"^known: must have shape \(60, 80\), got \(5, 5\)$"),
-        (FLOOR, np.ones(FLOOR.shape), r"^known: must be bool or integers, got dtype float64$"),
         (-FLOOR, np.eye(60, 80, dtype=bool), r"^scale: 60 of 4800 scales are outside"),
         (FLOOR * np.nan, np.eye(60, 80, dtype=bool), r"^scale: must be finite, but 60 of 4800 values are NaN"),
     ],
@@ -211,11 +185,6 @@ def test_one_known_pixel_is_enough() -> None:
 def test_extend_refuses(scale: np.ndarray, known: np.ndarray, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
         scale_maps.extend(scale, known)
-
-
-def test_an_unknown_trend_is_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"^trend: must be one of none, plane, linear, quadratic; got 'cubic'$"):
-        scale_maps.extend(FLOOR, FLOOR > 1, trend="cubic")
 
 
 # --- pictures ----------------------------------------------------------------------------------------------------------
@@ -249,23 +218,6 @@ def test_128_is_the_normal_size_and_the_ends_hold() -> None:
     assert scale_maps.encode(scale, "paper").tolist() == [[128, 255, 1]]
 
 
-@pytest.mark.parametrize(
-    ("image", "encoding", "message"),
-    [
-        (
-            np.ones((4, 4)),
-            "log2",
-            r"^image: must contain grey levels of dtype uint8 or uint16, got float64; floats need",
-        ),
-        (np.eye(3, dtype=np.uint8)[None], "log2", r"^image: must contain grey levels, got colours; a false-colour"),
-        (np.ones((4, 4), np.uint8), "log10", r"^encoding: must be one of log2, paper; got 'log10'$"),
-    ],
-)
-def test_decode_refuses(image: np.ndarray, encoding: str, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        scale_maps.decode(image, encoding)
-
-
 def test_decode_checks_memory_before_it_begins() -> None:
     image = np.zeros((1024, 1024), np.uint8)
     with limits.context(memory=4 << 20), pytest.raises(LimitExceeded, match="image: needs 8.4 MB of memory"):
@@ -287,8 +239,3 @@ def test_red_is_large_and_blue_is_small() -> None:
     assert near[0, 0, 0] > near[0, 0, 2] + 50
     assert far[0, 0, 2] > far[0, 0, 0] + 50
     assert scale_maps.picture(np.ones((8, 8)))[0, 0].min() > 230
-
-
-def test_pictures_refuse_a_bar_without_a_span() -> None:
-    with pytest.raises(InvalidInput, match=r"^largest: must be a number between 1.1 and 64, got 1$"):
-        scale_maps.picture(FLOOR, largest=1)

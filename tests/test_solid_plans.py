@@ -98,7 +98,6 @@ def test_the_command_takes_a_plan(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"patches": "fly"}, "^patches: "),
         ({"patches": "large", "quality": "fast"}, "^patches: cannot be combined with quality='fast'"),
         ({"patches": "auto", "method": "paper"}, "^patches: cannot be combined with method='paper'"),
     ],

@@ -1,7 +1,6 @@
 """The background between separate elements: as rough as the texture's, with shadows of elements, in one light."""
 
 import numpy as np
-import pytest
 
 import texrs
 from texrs import samples
@@ -131,9 +130,3 @@ def test_what_is_kept_of_a_texture_changes_nothing() -> None:
         again = [texrs.splice(entry, LAYOUT, seed=seed).image for entry in (discs, other) for seed in (1, 2)]
         assert all((a == b).all() for a, b in zip(fresh, again, strict=True))
     assert not (fresh[0] == fresh[2]).all()
-
-
-@pytest.mark.parametrize("screening", [-1.0, float("nan"), "soft"])
-def test_bad_weights(screening: object) -> None:
-    with pytest.raises(texrs.errors.InvalidInput, match="screening: must be a number"):
-        texrs.splice(make_discs(), LAYOUT, screening=screening)  # type: ignore[arg-type]

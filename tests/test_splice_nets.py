@@ -187,7 +187,6 @@ def test_places_say_how_far_knots_and_lines_are() -> None:
 @pytest.mark.parametrize(
     ("entry", "options", "words"),
     [
-        (NET, {"use_nets": 1}, "use_nets: must be True or False"),
         (NET, {"use_nets": True, "use_cells": True}, "cannot be combined with use_cells"),
         (NET, {"use_nets": True, "method": "paper"}, "use_nets: .*deforms"),
         (NET, {"use_nets": True, "method": "preview"}, "use_nets: .*deforms"),

@@ -12,7 +12,6 @@ from scipy.ndimage import binary_dilation, gaussian_filter
 import texrs
 from texrs import samples
 from texrs.elements import ElementAnalysis, Layout
-from texrs.errors import InvalidInput
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.ground import survey
 
@@ -225,12 +224,6 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
             made.append(texrs.self_splice(BUTTONS, ["randomise", {"op": "scale", "factor": 0.9}], seed=3))
     np.testing.assert_array_equal(made[0].image, made[1].image)
     np.testing.assert_array_equal(made[0].source_map.label, made[1].source_map.label)
-
-
-@pytest.mark.parametrize("screening", [-1.0, float("inf"), "soft"])
-def test_bad_weights(screening: Any) -> None:
-    with pytest.raises(InvalidInput, match="screening: must be a number"):
-        texrs.self_splice(BUTTONS, "regularise", screening=screening)
 
 
 def test_of_a_texture_without_elements_the_ground_is_left() -> None:

@@ -359,15 +359,10 @@ def test_smallest_pictures(shape):
         ({"overlap": 21}, "between 1 and 20, got 21 (at most half of the 40 rows)"),
         ({"overlap": (4, 26)}, "between 1 and 25, got 26 (at most half of the 50 columns)"),
         ({"overlap": 2.5}, "overlap: must be an integer"),
-        ({"overlap": (3, 4, 5)}, "overlap: must be one number or"),
         ({"overlap": "8"}, "overlap: must be an integer"),
         ({"overlap": True}, "overlap: must be an integer"),
         ({"size": 30, "overlap": 4}, "overlap: cannot be combined with size"),
         ({"size": (1, 30)}, "size: must have at least 2 rows to wrap them, got 1"),
-        ({"size": (30, 40, 3)}, "size: must be an integer or integers (rows, columns)"),
-        ({"size": 0}, "size: each side must be at least 1"),
-        ({"wrap": "xy"}, "wrap: must be"),
-        ({"wrap": (True,)}, "wrap: must be"),
     ],
 )
 def test_arguments_are_checked(options, words):
@@ -378,11 +373,8 @@ def test_arguments_are_checked(options, words):
 @pytest.mark.parametrize(
     ("image", "words"),
     [
-        (np.zeros((8, 8, 8, 3), np.uint8), "a volume is not an image"),
         (np.zeros((8, 8, 80), np.uint8), "a volume is not an image"),
         (np.zeros((1, 8), np.uint8), "at least 2 rows"),
-        (np.zeros((0, 8), np.uint8), "image: each side"),
-        (np.full((8, 8), np.nan), "NaN"),
         ([["a"]], "image: must contain integers, floats or bool"),
     ],
 )

@@ -101,8 +101,6 @@ def test_each_map_of_a_material_is_checked():
 
 
 def test_only_pictures_are_checked():
-    with pytest.raises(InvalidInput, match="image: "):
-        texrs.check_tiling(np.zeros((8, 8, 8, 3), np.uint8))
     assert Tiling((None, 1.0), (None, (0, 8))).tiles == (False, True)
 
 

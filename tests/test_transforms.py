@@ -166,10 +166,6 @@ def test_it_can_be_sent_to_a_worker():
 def test_what_cannot_be_taken_is_said():
     with pytest.raises(InvalidInput, match=r"mask: must have the size of the image, \(96, 96\), got \(95, 96\)"):
         AUGMENT(IMAGE, LABELS[1:])
-    with pytest.raises(InvalidInput, match=r"boxes: must have shape \(n, k\) with k of at least 4"):
-        AUGMENT(IMAGE, boxes=[[1, 2, 3]])
-    with pytest.raises(InvalidInput, match="image: each side must be at least 16"):
-        AUGMENT(IMAGE[:12])
     with pytest.raises(InvalidInput, match="min_visible: must be a number between 0 and 1"):
         TextureAugment(1.5)
 

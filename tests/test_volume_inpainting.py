@@ -148,13 +148,11 @@ def test_holes_of_any_shape() -> None:
     ("options", "says"),
     [
         ({"mask": np.ones((40, 40, 40), bool)}, "mask: "),
-        ({"mask": np.ones((40, 40, 4), bool)}, "mask: "),
         ({"scale_map": "auto"}, "scale_map: only available for images"),
         ({"method": "optimise"}, "method: only available for images"),
         ({"wrap": True}, "wrap: only available for images"),
         ({"patch_size": 3}, "patch_size: "),
         ({"patch_size": 41}, "patch_size: "),
-        ({"screening": -1}, "screening: "),
         (
             {"image": np.zeros((40, 40, 8), np.uint8), "mask": np.ones((40, 40, 8), bool)},
             "mask: ",

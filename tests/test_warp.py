@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import texrs
-from texrs.errors import InvalidInput, LimitExceeded
+from texrs.errors import InvalidInput
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import from_points, mesh
 
@@ -105,10 +105,6 @@ def test_bad_warps() -> None:
             from_points(source, target, (10, 10))  # type: ignore[arg-type]
     with pytest.raises(InvalidInput, match="at least two"):
         mesh(np.zeros((1, 5, 2)))
-    with pytest.raises(InvalidInput, match="finite"):
-        mesh(np.full((4, 4, 2), np.nan))
-    with pytest.raises(InvalidInput, match="weight"):
-        mesh(grid(4, 4), np.zeros((3, 3), bool))
 
 
 # --- factors ---------------------------------------------------------------------------------------------------------
@@ -176,9 +172,3 @@ def test_bad_matrices() -> None:
 
     with pytest.raises(InvalidInput, match="positive definite"):
         Cholesky(-eye_array(4))
-    with pytest.raises(InvalidInput, match="shape"):
-        Cholesky(np.zeros((3, 4)))
-    with pytest.raises(LimitExceeded, match="limit"):
-        Cholesky(eye_array(1000), limit=100)
-    with pytest.raises(InvalidInput, match="sides"):
-        Cholesky(eye_array(4)).solve(np.zeros(5))
