@@ -30,7 +30,7 @@ import numpy as np
 import texrs
 from texrs import io
 from texrs.materials import Role
-from texrs.materials._lit_maps import decode_normals
+from texrs.materials.lit_maps import decode_normals
 
 IDS = "ids"
 NEAR = 0.501

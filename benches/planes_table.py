@@ -32,7 +32,7 @@ from texrs import Plane, io, planes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from plane_checks import dress, look, squeeze, turn_between
-from texrs.planes._choose import measure_known_scale
+from texrs.planes.choose import measure_known_scale
 
 NAMES = ("bricks", "setts", "pebbles", "dots", "weave", "beans", "scales")
 SIZE = (256, 320)

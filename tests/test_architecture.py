@@ -102,6 +102,14 @@ def test_papers_do_not_import_each_other() -> None:
             assert others <= {parts[1]}, name
 
 
+@pytest.mark.parametrize("name", [n for n in FILES if n not in TOP])
+def test_private_modules_are_imported_by_their_own_package_only(name: str) -> None:
+    package = name if FILES[name].name == "__init__.py" else name.rpartition(".")[0]
+    for other in imports(name):
+        owner, private, _ = other.partition("._")
+        assert not private or f"{package}.".startswith(f"{owner}."), other
+
+
 def test_every_module_has_a_layer() -> None:
     assert {name.partition(".")[0] for name in FILES} - set(TOP) == RANK.keys() - {"_rust"}
 

@@ -10,7 +10,7 @@ import pytest
 import texrs
 from texrs import io, samples
 from texrs.cli import main
-from texrs.painting._reading import read_mesh
+from texrs.painting.reading import read_mesh
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("xatlas")
@@ -88,7 +88,7 @@ def test_directions_are_at_the_scale_of_the_atlas(here: Path) -> None:
 
 def test_colours_of_corners(here: Path) -> None:
     assert main(["paint", "ball.stl", "stripes.tif", "-o", "c.ply", "--vertices", *SMALL]) == 0
-    vertices, faces = texrs.painting._reading.read_mesh("ball.stl")[:2]
+    vertices, faces = texrs.painting.reading.read_mesh("ball.stl")[:2]
     wanted = texrs.SolidTexture(STRIPES).sample(vertices[:, ::-1] * 2)
     assert np.array_equal(trimesh.load("c.ply", process=False).visual.vertex_colors[:, :3], wanted)
     assert len(faces) == 80

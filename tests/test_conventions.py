@@ -17,11 +17,11 @@ from texrs._notices import collect
 from texrs._typing import Array
 from texrs.cli import main
 from texrs.errors import InputWarning, InvalidInput
-from texrs.io._exr_layers import read_layers
+from texrs.io.exr_layers import read_layers
 from texrs.materials import Role, guess_role
-from texrs.materials._conventions import CONVENTIONS, File, guess_roles, list_conventions
 from texrs.materials._roles import CODED
-from texrs.source_map._vectors import stores_z
+from texrs.materials.conventions import CONVENTIONS, File, guess_roles, list_conventions
+from texrs.source_map.vectors import stores_z
 
 SHAPE = (64, 64)
 DOTS = samples.load("dots", size=SHAPE)

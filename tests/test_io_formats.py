@@ -16,7 +16,7 @@ from texrs import io as tio
 from texrs._notices import collect
 from texrs.cli import main
 from texrs.errors import FileError, InputWarning, InvalidInput
-from texrs.io import _formats, _pillow, _tiff
+from texrs.io import _tiff, formats, pillow
 from texrs.materials import Material
 
 COLOURS = make.picture((24, 20, 3))
@@ -31,7 +31,7 @@ def read_with_notices(path):
 # --- TGA, DDS, PSD, AVIF, JPEG XL ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", sorted(_pillow.SAVED.keys() - {".jxl"}))
+@pytest.mark.parametrize("suffix", sorted(pillow.SAVED.keys() - {".jxl"}))
 def test_pillow_reads_what_is_written(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     tio.write(path, COLOURS if suffix != ".gif" else COLOURS // 64 * 64)
@@ -360,9 +360,9 @@ def test_folders_of_any_format_are_materials(tmp_path):
 
 
 def test_every_suffix_that_is_written_is_read():
-    assert set(_formats.WRITTEN_IMAGES) <= set(_formats.READ_IMAGES)
-    assert set(_formats.WRITTEN_VOLUMES) <= set(_formats.READ_VOLUMES)
-    assert set(_pillow.SAVED) <= set(_formats.WRITTEN_IMAGES)
+    assert set(formats.WRITTEN_IMAGES) <= set(formats.READ_IMAGES)
+    assert set(formats.WRITTEN_VOLUMES) <= set(formats.READ_VOLUMES)
+    assert set(pillow.SAVED) <= set(formats.WRITTEN_IMAGES)
 
 
 def test_opaque_alpha_may_go_to_formats_without_alpha(tmp_path):

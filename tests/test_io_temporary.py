@@ -11,7 +11,7 @@ import pytest
 
 from texrs import io as tio
 from texrs.errors import FileError
-from texrs.io import _temporary
+from texrs.io import temporary
 
 posix = pytest.mark.skipif(os.name != "posix", reason="whether a process is there is asked of POSIX")
 
@@ -38,13 +38,13 @@ def test_what_a_killed_process_left_goes_when_the_next_one_writes(tmp_path):
 
 @posix
 def test_only_what_nobody_is_making_is_swept(tmp_path):
-    home = _temporary._find_home()
+    home = temporary._find_home()
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     other = f"{int(home, 16) ^ 1:08x}"
     week = time.time() - 8 * 24 * 3600
     kept = {
-        f"{_temporary.name_prefix()}00000000.png",
+        f"{temporary.name_prefix()}00000000.png",
         f".texrs-{home}-1-00000000.png",
         f".texrs-{other}-{gone.pid}-00000000.png",
         f".texrs-{home}-{gone.pid}-00000000.former",
@@ -69,7 +69,7 @@ def test_only_what_nobody_is_making_is_swept(tmp_path):
     elsewhere.mkdir()
     (elsewhere / "mine").write_bytes(b"x")
     (tmp_path / f".texrs-{home}-{gone.pid}-22222222").symlink_to(elsewhere)
-    _temporary.sweep(os.fspath(tmp_path))
+    temporary.sweep(os.fspath(tmp_path))
     assert {p.name for p in tmp_path.iterdir()} == kept | {"elsewhere"}
     assert (elsewhere / "mine").exists()
 

@@ -12,7 +12,7 @@ from texrs._colours import decode_srgb
 from texrs._typing import Array
 from texrs.cli import main
 from texrs.errors import FileError, InputWarning, InvalidInput, LimitExceeded
-from texrs.io._exr_layers import read_layers
+from texrs.io.exr_layers import read_layers
 from texrs.materials import Role
 
 RANDOM = np.random.default_rng(7)

@@ -17,7 +17,7 @@ import texrs
 from texrs import Material
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
-from texrs.materials._meshes import Mesh, make_plane, make_sphere
+from texrs.materials.meshes import Mesh, make_plane, make_sphere
 
 STONES = texrs.samples.pebbles((48, 64)).image
 GREYS = STONES[..., 0]

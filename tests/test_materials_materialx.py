@@ -12,7 +12,7 @@ import texrs
 from texrs import Material, io
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
-from texrs.materials._surface import measure_relief
+from texrs.materials.surface import measure_relief
 
 STONES = texrs.samples.pebbles((48, 64)).image
 GREYS = STONES[..., 0]

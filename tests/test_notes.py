@@ -11,7 +11,7 @@ import tifffile
 from PIL import Image, ImageCms
 
 from texrs import io
-from texrs.io._annotation import BLANK, is_unchanged
+from texrs.io.annotation import BLANK, is_unchanged
 
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 MADE = '{"texrs": "1", "options": {"--a-b": "\\u00fc"}, ' + BLANK + "}"

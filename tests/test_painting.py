@@ -12,8 +12,8 @@ from texrs.errors import FileError, InvalidInput
 from texrs.painting import field_on_surface, texture_mesh
 from texrs.painting._baking import bake_points, lean
 from texrs.painting._meshes import find_normals, find_tangents
-from texrs.painting._reading import read_mesh
 from texrs.painting._sets import lay_flat
+from texrs.painting.reading import read_mesh
 
 trimesh = pytest.importorskip("trimesh")
 

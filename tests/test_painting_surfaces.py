@@ -11,7 +11,7 @@ from texrs import _notices, samples
 from texrs.errors import FileError, InputWarning, InvalidInput
 from texrs.painting import texture_mesh
 from texrs.painting._baking import bake_points
-from texrs.painting._reading import read_mesh
+from texrs.painting.reading import read_mesh
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -11,8 +11,8 @@ from plane_checks import bend, bulge, look, look_twice, roll
 from texrs import Plane, io, planes, samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
-from texrs.planes._choose import measure_known_scale
-from texrs.planes._sizes import SURE, agree, weigh_bands
+from texrs.planes.choose import measure_known_scale
+from texrs.planes.sizes import SURE, agree, weigh_bands
 
 
 @pytest.mark.parametrize("name", ["weave", "dots", "pebbles"])

@@ -16,7 +16,7 @@ from PIL import Image, ImageCms
 import texrs
 from texrs import SourceMap, io, samples
 from texrs.cli import main
-from texrs.io._formats import FORMATS
+from texrs.io.formats import FORMATS
 
 Capture = pytest.CaptureFixture[str]
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()

@@ -8,7 +8,7 @@ import texrs
 from texrs import SourceMap, samples, scale_maps
 from texrs._engine.pyramid import ONE
 from texrs.exemplar.sheet import Copies, Flattened, find_plane
-from texrs.scale_maps._slope import Slope
+from texrs.scale_maps.slope import Slope
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import texrs
 from texrs import Plane, PlaneView
 from texrs._masks import widen
 from texrs.errors import InvalidInput
-from texrs.planes import _choose
+from texrs.planes import choose
 
 SHAPE = (96, 128)
 PLANE = Plane(SHAPE, 40, 100, fov=55)
@@ -59,13 +59,13 @@ def test_what_says_nothing_gets_a_sentence(make: Callable[[], object], words: st
 def test_nothing_is_looked_for_before_all_is_checked(
     verb: Callable[..., object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_choose, "find_ground", None)
+    monkeypatch.setattr(choose, "find_ground", None)
     with pytest.raises(InvalidInput, match="plane: must have the shape"):
         verb(PICTURE, view=Plane((9, 9), 20))
 
 
 def test_nor_is_it_in_what_is_taken_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_choose, "find_ground", None)
+    monkeypatch.setattr(choose, "find_ground", None)
     with pytest.raises(InvalidInput, match="plane: must have the shape"):
         texrs.remove(PICTURE, MASK, view=Plane((9, 9), 20))
     with pytest.raises(InvalidInput, match="corners: must form a convex quadrilateral"):

@@ -11,7 +11,7 @@ import texrs
 from texrs import io, samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
-from texrs.inpainting import _volumes
+from texrs.inpainting import volumes
 
 
 def make_ball(shape: tuple[int, ...], radius: float) -> np.ndarray:
@@ -74,10 +74,10 @@ def make_cells(seed: int = 5) -> np.ndarray:
 
 def test_smaller_patches_are_tried_if_the_border_of_a_hole_shows() -> None:
     labels, hole = make_cells(), make_ball((40, 40, 40), 10)
-    usual, least = _volumes.list_sides(_volumes.choose_side(hole, hole.shape), labels=True)[::3]
+    usual, least = volumes.list_sides(volumes.choose_side(hole, hole.shape), labels=True)[::3]
     made = texrs.inpaint(labels, hole, seed=1)
     fixed = texrs.inpaint(labels, hole, seed=1, patch_size=usual)
-    steps = [_volumes.measure_step(each.image, hole, labels=True) for each in (made, fixed)]
+    steps = [volumes.measure_step(each.image, hole, labels=True) for each in (made, fixed)]
     assert steps[0] < 0.85 * steps[1]
     assert made.report["candidates"][0] == [usual, round(steps[1], 3)]
     assert least <= made.report["patch_size"] < usual

@@ -13,9 +13,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from texrs._calls import check_call
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.limits._context import MAX_PIXELS as MAX_PIXELS
-from texrs.limits._context import find
-from texrs.limits._estimates import estimate_memory
+from texrs.limits.active import MAX_PIXELS as MAX_PIXELS
+from texrs.limits.active import find
+from texrs.limits.estimates import estimate_memory
 
 FREE = 2**20
 """Maximum size in bytes that is allocated without a check of the available memory.

@@ -17,7 +17,7 @@ import numpy as np
 from texrs import elements, io
 from texrs._typing import Array
 from texrs.errors import FileError, TexrsError
-from texrs.io._formats import READ_VOLUMES
+from texrs.io.formats import READ_VOLUMES
 from texrs.source_map import SourceMap
 
 LayerData = tuple[Any, dict[str, Any], str]

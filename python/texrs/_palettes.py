@@ -20,8 +20,8 @@ from texrs._masks import Mask
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.errors import TexrsError
-from texrs.io import _origins
-from texrs.materials._material import Material
+from texrs.io import origins
+from texrs.materials.material import Material
 from texrs.source_map import RenderOptions, SourceMap
 from texrs.synthesis import Synthesis
 
@@ -106,7 +106,7 @@ def find(given: dict[str, Any], names: Sequence[str], usual: Mapping[str, Any]) 
         images += [(name, image) for image in _list_images(value)]
     if not images or not all(image.ndim in (2, 3) and image.shape[2:] < (5,) for _, image in images):
         return None
-    known = [_origins.find(image) for _, image in images]
+    known = [origins.find(image) for _, image in images]
     if not asked:
         indexed = [origin is not None and origin[1] for origin in known]
         kept = [_keeps(image, has_table) for (_, image), has_table in zip(images, indexed, strict=True)]

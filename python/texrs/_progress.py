@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from texrs._calls import check_call
 from texrs.errors import InvalidInput
-from texrs.limits._context import check_time, find_end
+from texrs.limits.active import check_time, find_end
 
 if TYPE_CHECKING:
     # Import the type names only here, because they would import NumPy.

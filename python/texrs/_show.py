@@ -84,6 +84,6 @@ def preview(image: Array) -> Array:
 
 def as_png(image: Array) -> bytes:
     """Return an image as the bytes of a PNG file."""
-    from texrs.io._image_io import encode
+    from texrs.io.image_io import encode
 
     return encode("image", np.ascontiguousarray(preview(image)), "png")

@@ -14,7 +14,7 @@ from texrs._notices import Notices, collect, repeat
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.materials._material import Material, apply_materials, guide_materials
+from texrs.materials.material import Material, apply_materials, guide_materials
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from texrs._show import as_png, preview
 from texrs._typing import Array
-from texrs.io._pillow import encode
+from texrs.io.pillow import encode
 
 MOST = 2**20
 """Approximate maximum number of characters of the page."""

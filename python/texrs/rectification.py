@@ -23,7 +23,7 @@ from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.planes import Plane, PlaneView
-from texrs.planes._choose import see
+from texrs.planes.choose import see
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import tile

@@ -19,10 +19,10 @@ from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.errors import InvalidInput
-from texrs.inpainting._planes import Part, add_rest, fill_parts
+from texrs.inpainting.planes import Part, add_rest, fill_parts
 from texrs.materials import Material
 from texrs.planes import Plane, PlaneView
-from texrs.planes._choose import as_views, find_grounds, follow_plane
+from texrs.planes.choose import as_views, find_grounds, follow_plane
 from texrs.synthesis import Synthesis
 
 __all__ = ["remove"]

@@ -43,7 +43,7 @@ from texrs._chunks.words import share_words
 from texrs._chunks.workers import WorkerLost
 from texrs._typing import Path, Progress
 from texrs.errors import FileError, InvalidInput
-from texrs.io._files import as_path, translate_errors
+from texrs.io.files import as_path, translate_errors
 
 __all__ = ["Failed", "Stored", "WorkerLost", "map_to_zarr", "open_store"]
 

@@ -14,7 +14,7 @@ from texrs._arrays import as_image
 from texrs._show import as_png, measure, preview, spell_list
 from texrs._typing import Array, Path
 from texrs._viewer import as_page
-from texrs.materials._material import Material
+from texrs.materials.material import Material
 from texrs.source_map import SourceMap
 
 __all__ = ["ResultList", "Synthesis"]
@@ -90,7 +90,7 @@ class Synthesis:
 
         """
         from texrs.io import atomic, write
-        from texrs.io._files import as_path
+        from texrs.io.files import as_path
 
         directory = as_path(folder)
         directory.mkdir(parents=True, exist_ok=True)

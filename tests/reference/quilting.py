@@ -6,7 +6,7 @@ import numpy as np
 
 from texrs.kernels.patch_search import Match, PatchIndex
 from texrs.quilting._quilt import COLOUR, DEPTH, find_phase, mark_hands, number_cells
-from texrs.source_map._pixels import Pixels
+from texrs.source_map.pixels import Pixels
 
 FREE = 2**32 - 1
 POOL, CANDIDATES, CELL = (48, 96), 3, 8

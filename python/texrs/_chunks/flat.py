@@ -31,8 +31,8 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
-from texrs.io._files import as_path, find_suffix
-from texrs.io._formats import FORMATS, RAW, check
+from texrs.io.files import as_path, find_suffix
+from texrs.io.formats import FORMATS, RAW, check
 
 __all__ = ["HEADER", "RAW", "Filled", "check_suffix", "fill"]
 

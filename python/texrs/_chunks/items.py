@@ -22,7 +22,7 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 
 __all__ = ["Failed", "map_items"]
 

@@ -17,8 +17,8 @@ from texrs._chunks.words import share_words
 from texrs._typing import Path, Progress
 from texrs.errors import InvalidInput
 from texrs.io import atomic
-from texrs.io._files import find_suffix
-from texrs.io._formats import as_spacing
+from texrs.io.files import find_suffix
+from texrs.io.formats import as_spacing
 
 __all__ = ["InParts", "Part"]
 

@@ -21,8 +21,8 @@ from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
-from texrs.io._files import as_path
-from texrs.io._ome import describe_image
+from texrs.io.files import as_path
+from texrs.io.ome import describe_image
 
 __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
 

@@ -22,7 +22,7 @@ from texrs._cache import content_hash
 from texrs._checks import as_int
 from texrs._threads import threads
 from texrs.errors import InvalidInput, TexrsError
-from texrs.limits._context import context, said, set
+from texrs.limits.active import context, said, set
 
 __all__ = ["Scheduler", "WorkerLost", "run"]
 

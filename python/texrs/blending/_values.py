@@ -10,7 +10,7 @@ import numpy as np
 
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.source_map._vectors import stores_z
+from texrs.source_map.vectors import stores_z
 
 STRIP = 2**22
 """Maximum number of pixels that are solved at once. It is four times as large if corrections reach far."""

@@ -53,7 +53,7 @@ from texrs.cli._recipes import (
     read_recipe,
 )
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.io._annotation import is_unchanged
+from texrs.io.annotation import is_unchanged
 from texrs.materials import Material
 
 CELL = 256

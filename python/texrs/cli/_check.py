@@ -18,7 +18,7 @@ from texrs.materials import Material
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import Tiling, check_tiling
-from texrs.tiling._borders import SEEN
+from texrs.tiling.borders import SEEN
 
 COPIES = (2, 2)
 BORDERS = {"rows": "bottom to top", "columns": "right to left"}

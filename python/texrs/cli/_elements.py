@@ -31,7 +31,7 @@ from texrs.elements import analyse, draw
 from texrs.elements import to_html as draw_page
 from texrs.errors import FileError, InvalidInput
 from texrs.materials import Material
-from texrs.materials._single import SingleMap
+from texrs.materials.single import SingleMap
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 

@@ -15,11 +15,11 @@ from texrs._notices import ignore
 from texrs.cli._outputs import SAMPLE
 from texrs.cli._provenance import expand_braces
 from texrs.errors import InvalidInput
-from texrs.io._files import find_suffix
-from texrs.io._formats import READ_IMAGES, READ_VOLUMES
+from texrs.io.files import find_suffix
+from texrs.io.formats import READ_IMAGES, READ_VOLUMES
 from texrs.materials import Role
-from texrs.materials._conventions import cut_name, guess_roles
-from texrs.materials._files import DOCUMENTS, SYSTEM
+from texrs.materials.conventions import cut_name, guess_roles
+from texrs.materials.files import DOCUMENTS, SYSTEM
 
 __all__ = ["OF_VOLUMES", "Source", "fill", "find_sources", "list_known"]
 

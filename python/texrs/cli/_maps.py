@@ -22,7 +22,7 @@ from texrs.cli._parts import is_stored
 from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
 from texrs.materials import Map, apply
-from texrs.materials._applying import Green, Kind, choose_finish, choose_kind, find_packed, look_up
+from texrs.materials.applying import Green, Kind, choose_finish, choose_kind, find_packed, look_up
 from texrs.source_map import RenderOptions, SourceMap
 
 APPLIED = Options(

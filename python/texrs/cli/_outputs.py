@@ -25,11 +25,11 @@ from texrs.cli._places import PLACED, say_places
 from texrs.cli._provenance import RUNNING, as_flag, check_free, read_status
 from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.io._annotation import name_sidecar, needs_sidecar
-from texrs.io._files import find_suffix
-from texrs.io._formats import RAW, STORE, check, detect_kind, holds_spacing, keeps_spacing
-from texrs.io._pillow import write_indexed
-from texrs.io._temporary import name_prefix, put, sweep
+from texrs.io.annotation import name_sidecar, needs_sidecar
+from texrs.io.files import find_suffix
+from texrs.io.formats import RAW, STORE, check, detect_kind, holds_spacing, keeps_spacing
+from texrs.io.pillow import write_indexed
+from texrs.io.temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
 NEGATIVE = re.compile(r"-[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)

@@ -22,11 +22,11 @@ from texrs.cli._readers import read_stated_spacing, read_volume
 from texrs.cli._stacks import Roles, read_roles
 from texrs.cli._texts import About
 from texrs.errors import InvalidInput
-from texrs.io._temporary import name_prefix
+from texrs.io.temporary import name_prefix
 from texrs.materials import Material
 from texrs.painting import field_on_surface, find_scale, texture_mesh
-from texrs.painting._files import check_suffix
-from texrs.painting._reading import read_mesh
+from texrs.painting.files import check_suffix
+from texrs.painting.reading import read_mesh
 from texrs.papers.solid.window import SolidTexture
 
 

@@ -24,9 +24,9 @@ from texrs._version import __version__
 from texrs.cli._places import has_rows_first
 from texrs.cli._tails import split_tail
 from texrs.errors import InvalidInput
-from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
-from texrs.materials._conventions import guess_roles
-from texrs.materials._files import read_labels, split_suffix
+from texrs.io.annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.materials.conventions import guess_roles
+from texrs.materials.files import read_labels, split_suffix
 
 LEFT = (
     "count",

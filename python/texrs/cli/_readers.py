@@ -23,7 +23,7 @@ from texrs.cli._provenance import expand_braces
 from texrs.cli._tails import make_mask
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
 from texrs.errors import FileError, InvalidInput
-from texrs.io._files import check_file
+from texrs.io.files import check_file
 
 VOLUMES = "a TIFF of several slices, .npy, .npz, .vti, NRRD, NIfTI or Zarr"
 """File formats of volumes, as errors list them."""
@@ -62,7 +62,7 @@ def read_example(text: str, about: About, *, finite: bool = True, single: bool =
     """Read an image or a material: a folder of maps, an EXR file of several layers, or a single map by its name."""
     from texrs.cli._stacks import is_stack
     from texrs.materials import Material
-    from texrs.materials._single import read_single
+    from texrs.materials.single import read_single
 
     if text.startswith(SAMPLE) or not is_stack(text):
         alone = read_single(text) if single and os.path.isfile(text) else None
@@ -193,7 +193,7 @@ def is_number(text: str) -> bool:
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:
     """Read a scale map, with its kind if the file states it. Floats are scales, and grey levels are decoded to scales."""
     from texrs import scale_maps
-    from texrs.scale_maps._kinds import keep_kind, parse_kind
+    from texrs.scale_maps.kinds import keep_kind, parse_kind
 
     values, kind = io.read(path), parse_kind(io.read_description(path))
     if values.dtype.kind == "f":

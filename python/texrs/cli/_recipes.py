@@ -18,7 +18,7 @@ from texrs.cli._inputs import Source, fill, find_sources, list_known
 from texrs.cli._outputs import OUTPUTS, SAMPLE
 from texrs.cli._provenance import expand_braces, read_status
 from texrs.errors import FileError, InvalidInput
-from texrs.io._formats import READ_IMAGES, READ_VOLUMES, WRITTEN_IMAGES, WRITTEN_VOLUMES
+from texrs.io.formats import READ_IMAGES, READ_VOLUMES, WRITTEN_IMAGES, WRITTEN_VOLUMES
 
 __all__ = [
     "Job",

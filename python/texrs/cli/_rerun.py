@@ -26,12 +26,12 @@ from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING, expand_braces
 from texrs.cli._stacks import is_stack
 from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput
-from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
-from texrs.io._formats import detect_kind
-from texrs.io._grids import holds_volume
-from texrs.io._pillow import count_frames
-from texrs.io._raw import strip_raw
-from texrs.io._temporary import name_prefix
+from texrs.io.annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.io.formats import detect_kind
+from texrs.io.grids import holds_volume
+from texrs.io.pillow import count_frames
+from texrs.io.raw import strip_raw
+from texrs.io.temporary import name_prefix
 from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
 

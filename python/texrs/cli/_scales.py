@@ -22,7 +22,7 @@ from texrs.cli._options import Options, check_needed, make_choice, take_options
 from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._readers import read_mask, read_picture, read_scale_map
 from texrs.errors import InvalidInput
-from texrs.scale_maps._kinds import describe_kind, find_kind
+from texrs.scale_maps.kinds import describe_kind, find_kind
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
 """Formats that store scales as floats. Images of 8 bits store scales encoded as grey levels."""

@@ -23,12 +23,12 @@ from texrs.cli._places import turn
 from texrs.cli._readers import read_stated_spacing, read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
-from texrs.fields._spaced import as_distances
+from texrs.fields.spaced import as_distances
 from texrs.volume import Viewer, cubes, label_to_color, oblique_slice, render_block, render_volume, slices, turntable
-from texrs.volume._stretch import find_cube
-from texrs.volume._values import as_direction
 from texrs.volume.rendering import as_steps, check_cube, check_turntable
+from texrs.volume.stretch import find_cube
 from texrs.volume.transparent import check_transfer, parse_transfer
+from texrs.volume.values import as_direction
 
 _AXES = {"plane": 0, "row": 1, "column": 2, "z": 0, "y": 1, "x": 2}
 """Names of axes, as array axes and as coordinates, and the index of each."""

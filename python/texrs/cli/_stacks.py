@@ -18,11 +18,11 @@ from texrs._notices import collect
 from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free, expand_braces
 from texrs.errors import FileError, InvalidInput
-from texrs.io._exr_layers import list_channels
+from texrs.io.exr_layers import list_channels
 from texrs.materials import Material
-from texrs.materials._conventions import CONVENTIONS, as_convention
-from texrs.materials._converting import convert
-from texrs.materials._files import SMALLER, choose_suffix, split_suffix
+from texrs.materials.conventions import CONVENTIONS, as_convention
+from texrs.materials.converting import convert
+from texrs.materials.files import SMALLER, choose_suffix, split_suffix
 from texrs.synthesis import Synthesis
 
 PANEL = "Materials"

@@ -8,7 +8,7 @@ from typing import Any
 
 from texrs._masks import Mask
 from texrs.cli._texts import parse_numbers
-from texrs.io._raw import RAW, strip_raw
+from texrs.io.raw import RAW, strip_raw
 
 __all__ = ["make_mask", "split_tail"]
 

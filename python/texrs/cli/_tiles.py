@@ -23,7 +23,7 @@ from texrs.cli._texts import About, parse_size
 from texrs.corner_tiles import CornerTiles
 from texrs.errors import InvalidInput
 from texrs.materials import Material
-from texrs.materials._single import SingleMap
+from texrs.materials.single import SingleMap
 from texrs.papers.design import design_variants
 
 CELLS = 256

@@ -30,7 +30,7 @@ from texrs.cli._stacks import OPTIONS, SHOWN, Stack
 from texrs.cli._texts import About
 from texrs.errors import LimitExceeded
 from texrs.materials import Material, guess_role
-from texrs.materials._single import SingleMap
+from texrs.materials.single import SingleMap
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(

@@ -40,7 +40,7 @@ from texrs.cli._readers import is_number, read_stated_spacing
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
 from texrs.errors import FileError, InvalidInput
-from texrs.io._grids import holds_volume
+from texrs.io.grids import holds_volume
 from texrs.materials import Material, guess_role
 from texrs.synthesis import Synthesis
 
@@ -169,7 +169,7 @@ def tell_filled(result: Synthesis) -> str:
 
 def tell_filled_volume(result: Synthesis) -> str:
     """Return a text with the filled share of a volume, and the step at the border of the hole."""
-    from texrs.inpainting._volumes import SEEN
+    from texrs.inpainting.volumes import SEEN
 
     step = dict(result.report["candidates"])[result.report["patch_size"]]
     visible = "" if step <= SEEN else " and visible: try --patch-size, --seed or --boundary-width"
@@ -221,7 +221,7 @@ def read_voxels(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 def say_planes(result: Synthesis) -> str:
     """Return a text about the slant and tilt of the planes that were used."""
-    from texrs.planes._sizes import SURE
+    from texrs.planes.sizes import SURE
 
     said = []
     for each in result.report.get("planes", [result.report]):

@@ -43,7 +43,7 @@ from texrs.corner_tiles._lattice_step import choose_side, find_step
 from texrs.corner_tiles._shaders import write_shaders
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 from texrs.materials import Material
 from texrs.papers.design import design_variants
 from texrs.source_map import SourceMap

@@ -22,7 +22,7 @@ from texrs.database._contact_sheet import ContactSheet
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.elements import FORMAT, ElementAnalysis, ElementSearch, Layout, LayoutName, analyse, hash_image, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 

@@ -14,10 +14,10 @@ from texrs.elements._arrangement import Arrangement
 from texrs.elements._corrections import correct
 from texrs.elements._drawn_stages import draw
 from texrs.elements._elements import FORMAT, ElementAnalysis, hash_image, load
-from texrs.elements._instances import Instance
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch
 from texrs.elements._page import to_html
+from texrs.elements.instances import Instance
 
 __all__ = [
     "FORMAT",

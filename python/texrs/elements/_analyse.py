@@ -14,7 +14,6 @@ from texrs._arrays import as_image, check_work, guidance, to_lab
 from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
-from texrs.elements._arguments import Arguments, check_consistency, find_contradiction
 from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import ElementAnalysis
 from texrs.elements._finder_view import FEWEST, View, view_elements
@@ -23,6 +22,7 @@ from texrs.elements._options import ElementSearch, Settings
 from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
 from texrs.elements._search import Detections, search_similar
 from texrs.elements._separation import Separation, add_missing, find_nearest_pixels, reconcile
+from texrs.elements.arguments import Arguments, check_consistency, find_contradiction
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.point_sets import directions, spacing

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_instance, as_int
 from texrs._typing import Bools, Labels
-from texrs.elements._arguments import as_points, find_contradiction
 from texrs.elements._elements import ElementAnalysis
 from texrs.elements._layout import Layout
 from texrs.elements._mask import ellipse, round_to_odd, stamp
 from texrs.elements._separation import find_nearest_pixels, label_components
+from texrs.elements.arguments import as_points, find_contradiction
 from texrs.errors import InvalidInput
 from texrs.point_sets import directions, spacing
 

@@ -19,9 +19,9 @@ from texrs._show import as_png
 from texrs._typing import Array, Labels, Path
 from texrs.elements._arrangement import Arrangement, describe_arrangement
 from texrs.elements._drawing import draw_plain, mark_points
-from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements
-from texrs.elements._known import as_element_labels, extend_points, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName, as_layout
+from texrs.elements.instances import Instance, Labelled, cut_instances, label_elements
+from texrs.elements.known import as_element_labels, extend_points, measure_box, measure_centres
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.exemplar.shapes import mark_outlines

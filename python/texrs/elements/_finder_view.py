@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from texrs._arrays import to_lab
 from texrs._typing import Bools, Floats, Labels, Progress
-from texrs.elements._arguments import LEAST, Arguments, Box, as_box
-from texrs.elements._known import measure_centres
 from texrs.elements._layout import Layout
 from texrs.elements._mask import Wrap
 from texrs.elements._separation import label_components, rank_pieces
+from texrs.elements.arguments import LEAST, Arguments, Box, as_box
+from texrs.elements.known import measure_centres
 from texrs.exemplar.shapes import mark_outlines
 
 if TYPE_CHECKING:

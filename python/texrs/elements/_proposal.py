@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from texrs._arrays import to_lab
 from texrs._typing import Bools, Floats
-from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._finder_view import choose_layout, view_elements
 from texrs.elements._layout import Layout
 from texrs.elements._mask import disc, round_to_odd
 from texrs.elements._options import Settings
 from texrs.elements._search import search_similar
 from texrs.elements._separation import label_components
+from texrs.elements.arguments import LEAST, Arguments, Box, as_box
 from texrs.errors import InvalidInput
 from texrs.point_sets import spacing
 

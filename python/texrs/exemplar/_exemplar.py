@@ -44,7 +44,7 @@ from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.separate_elements import Instances, as_instances, find_instances
 from texrs.exemplar.stitching import guess_instances, make_stitcher
 from texrs.exemplar.symmetry import Flip, find_mirrors
-from texrs.io import _origins
+from texrs.io import origins
 
 if TYPE_CHECKING:
     from texrs.exemplar.element_finder import FoundElements
@@ -119,7 +119,7 @@ class Exemplar:
         self._pixels = checked.copy()
         self._pixels.flags.writeable = False
         self._image = self._pixels if given.ndim > self._axes else self._pixels[..., 0]
-        _origins.carry(given, self._image)
+        origins.carry(given, self._image)
         self._facts: dict[Hashable, object] = {}
 
     def __repr__(self) -> str:

@@ -25,8 +25,8 @@ from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure
 from texrs.exemplar.separate_elements import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
 from texrs.kernels.gather import gather
-from texrs.scale_maps._kinds import AREAS, Kind, find_kind
-from texrs.scale_maps._slope import Slope
+from texrs.scale_maps.kinds import AREAS, Kind, find_kind
+from texrs.scale_maps.slope import Slope
 
 __all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measure_seen", "multiply", "round_frames"]
 

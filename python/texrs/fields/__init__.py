@@ -34,11 +34,11 @@ singular frames before a long computation.
 """
 
 from texrs.fields._directions import from_directions, from_gradient, from_structure
-from texrs.fields._field import LEAST_DETERMINANT, MAX_CONDITION, Field, check
 from texrs.fields._given import FieldLike, as_field, read
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
 from texrs.fields._shapes import circular, constant, identity, rotation, rotation_3d, scale_ramp, shear, spiral, zigzag
+from texrs.fields.field import LEAST_DETERMINANT, MAX_CONDITION, Field, check
 
 __all__ = [
     "LEAST_DETERMINANT",

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_bool, as_choice, as_float, check_memory, try_array
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field
 from texrs.fields._sampled import make_grid
+from texrs.fields.field import Field
 
 __all__ = ["from_directions", "from_gradient", "from_structure"]
 

@@ -14,11 +14,11 @@ from texrs._arrays import as_axes, try_array
 from texrs._typing import Path
 from texrs.errors import InvalidInput
 from texrs.fields._directions import from_directions
-from texrs.fields._field import Field
 from texrs.fields._parse import parse
 from texrs.fields._sampled import from_array
-from texrs.fields._spaced import space
-from texrs.io._formats import READ_VOLUMES, STORE
+from texrs.fields.field import Field
+from texrs.fields.spaced import space
+from texrs.io.formats import READ_VOLUMES, STORE
 
 __all__ = ["FieldLike", "as_field", "read"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field
 from texrs.fields._matrices import Matrices, multiply, repeat
+from texrs.fields.field import Field
 
 LETTERS = "yx", "zyx"
 """Letters of the axes of images and of volumes, in order."""

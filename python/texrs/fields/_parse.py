@@ -9,8 +9,8 @@ from difflib import get_close_matches
 
 from texrs.errors import InvalidInput
 from texrs.fields import _shapes
-from texrs.fields._field import Field
-from texrs.fields._spaced import as_distances, space
+from texrs.fields.field import Field
+from texrs.fields.spaced import as_distances, space
 
 _KNOWN: dict[str, Callable[..., Field]] = {
     f.__name__: f

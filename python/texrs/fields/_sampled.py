@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_size, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field, as_place, as_points, check_axes, refuse_flat
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
+from texrs.fields.field import Field, as_place, as_points, check_axes, refuse_flat
 
 MAX_FRAMES = 2**24
 """Maximum number of frames in an array, enough for a volume of 256 voxels a side."""

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, try_array
 from texrs.errors import InvalidInput
-from texrs.fields._field import FAR, Field, as_place, check_axes, refuse_flat
 from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
+from texrs.fields.field import FAR, Field, as_place, check_axes, refuse_flat
 
 _WORDS = {"plane": "z", "row": "y", "column": "x"}
 

@@ -37,10 +37,10 @@ from texrs.inpainting._fill import Filling, fill
 from texrs.inpainting._holes import check_material, find_hole
 from texrs.inpainting._optimise import optimise, recover_scale
 from texrs.inpainting._patches import LEAST, choose_mirrors
-from texrs.inpainting._volumes import inpaint_volume, is_volume
+from texrs.inpainting.volumes import inpaint_volume, is_volume
 from texrs.materials import Material
 from texrs.planes import ScaleEstimate
-from texrs.scale_maps._kinds import Kind, as_kind
+from texrs.scale_maps.kinds import Kind, as_kind
 from texrs.synthesis import Synthesis
 
 __all__ = ["inpaint"]

@@ -16,8 +16,8 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.exemplar.sheet import Flattened, find_plane
 from texrs.growth import stitch_sheet
 from texrs.inpainting._holes import look_around, paint_over
-from texrs.scale_maps._kinds import find_kind
-from texrs.scale_maps._slope import Slope
+from texrs.scale_maps.kinds import find_kind
+from texrs.scale_maps.slope import Slope
 from texrs.source_map import SourceMap
 
 __all__ = ["fill_in_depth", "see_plane"]
@@ -61,7 +61,7 @@ def fill_in_depth(
         Mask of the hole, and mask of the pixels that may be replaced.
     far : (H, W) bool, optional
         Pixels that may be replaced if elements are separate.
-    plane : texrs.scale_maps._slope.Slope
+    plane : texrs.scale_maps.slope.Slope
         Plane that the image shows.
     usable : (H, W) bool
         Mask of the pixels that may be copied.

@@ -9,7 +9,7 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.exemplar.symmetry import Flip
 from texrs.inpainting._depth import fill_in_depth
 from texrs.inpainting._patches import fill_with_patches
-from texrs.scale_maps._slope import Slope
+from texrs.scale_maps.slope import Slope
 from texrs.source_map import SourceMap
 
 

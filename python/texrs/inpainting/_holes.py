@@ -17,7 +17,7 @@ from texrs._masks import Mask, adjust, as_marks, check_share, mark, name_marks
 from texrs._notices import assume
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
-from texrs.io import _origins, read_metadata
+from texrs.io import origins, read_metadata
 
 
 def find_hole(image: object, mask: Mask, wrap: Sequence[bool], axes: int = 2) -> tuple[Array, Bools]:
@@ -140,7 +140,7 @@ def _as_number(value: object) -> float:
 
 def _find_nodata(image: object) -> tuple[str, float | None]:
     """Return the file of an image, and the value that it states for pixels without data."""
-    known = _origins.find(image) if isinstance(image, np.ndarray) else None
+    known = origins.find(image) if isinstance(image, np.ndarray) else None
     path = os.fspath(image) if isinstance(image, str | os.PathLike) else "" if known is None else known[0]
     return path, read_metadata(path).nodata if path else None
 

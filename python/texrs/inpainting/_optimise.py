@@ -19,9 +19,9 @@ from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.inpainting._holes import look_around, paint_over
 from texrs.planes import ScaleEstimate
-from texrs.planes._choose import measure_known_scale
-from texrs.scale_maps._kinds import Kind, find_kind, keep_kind
-from texrs.scale_maps._maps import as_map
+from texrs.planes.choose import measure_known_scale
+from texrs.scale_maps.kinds import Kind, find_kind, keep_kind
+from texrs.scale_maps.maps import as_map
 from texrs.source_map import SourceMap
 
 SETTINGS = replace(

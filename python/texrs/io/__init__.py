@@ -71,29 +71,29 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import (
-    _exr_layers,
-    _files,
-    _image_io,
     _npy,
-    _origins,
-    _pillow,
     _png_chunks,
-    _raw,
     _series,
     _slabs,
     _tiff,
     _volumes,
     _vtk,
     _zarr,
+    exr_layers,
+    files,
+    image_io,
+    origins,
+    pillow,
+    raw,
 )
-from texrs.io._annotation import read_metadata, write_metadata
-from texrs.io._files import atomic, find_suffix
-from texrs.io._formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, check, detect_kind, holds_spacing
-from texrs.io._grids import READERS, read_numpy, read_spacing, read_unit
 from texrs.io._notes import Metadata
 from texrs.io._npy import Header, read_arrays, read_headers
 from texrs.io._vectors import read_vectors
 from texrs.io._zarr import is_store
+from texrs.io.annotation import read_metadata, write_metadata
+from texrs.io.files import atomic, find_suffix
+from texrs.io.formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, check, detect_kind, holds_spacing
+from texrs.io.grids import READERS, read_numpy, read_spacing, read_unit
 
 __all__ = [
     "Header",
@@ -164,11 +164,11 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
            [ 8,  9, 10, 11]], dtype=uint16)
 
     """
-    name, limit = _files.as_path(path), as_limit(limit)
+    name, limit = files.as_path(path), as_limit(limit)
     kind = detect_kind(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
-        return _origins.mark(_tiff.take_image(name, planes, orientation), name, False)
+        return origins.mark(_tiff.take_image(name, planes, orientation), name, False)
     if kind in ("npy", "npz"):
         return read_numpy(name, kind, limit, 2)
     if kind == "zarr":
@@ -176,15 +176,15 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which contains a volume; read it with texrs.io.read_volume")
     if kind == "exr":
-        return _origins.mark(_exr_layers.read_image(name, limit), name, False)
-    file = _files.load(name, limit)
-    if kind in _pillow.DECODED:
-        array = _pillow.read(name, kind, file, limit)
+        return origins.mark(exr_layers.read_image(name, limit), name, False)
+    file = files.load(name, limit)
+    if kind in pillow.DECODED:
+        array = pillow.read(name, kind, file, limit)
     else:
-        with _files.translate_errors(name, "decoding"):
-            array = _files.turn_upright(*_image_io.decode(name, file, limit))
-    _pillow.ignore_frames(name, kind, file)
-    return _origins.mark(array, name, kind == "gif" or _pillow.is_indexed(name, kind, file))
+        with files.translate_errors(name, "decoding"):
+            array = files.turn_upright(*image_io.decode(name, file, limit))
+    pillow.ignore_frames(name, kind, file)
+    return origins.mark(array, name, kind == "gif" or pillow.is_indexed(name, kind, file))
 
 
 def read_fov(path: PathLike) -> float | None:
@@ -217,7 +217,7 @@ def read_fov(path: PathLike) -> float | None:
     True
 
     """
-    focal = _pillow.read_focal(_files.as_path(path))
+    focal = pillow.read_focal(files.as_path(path))
     return None if focal is None else 2 * degrees(atan(FILM / 2 / focal))
 
 
@@ -250,7 +250,7 @@ def read_description(path: PathLike) -> str | None:
     'nothing but black'
 
     """
-    return _pillow.read_description(_files.as_path(path))
+    return pillow.read_description(files.as_path(path))
 
 
 def read_volume(
@@ -299,19 +299,19 @@ def read_volume(
     ((5, 4, 3), (5, 4, 3))
 
     """
-    name, limit = _files.as_path(path), as_limit(limit, axes=3)
+    name, limit = files.as_path(path), as_limit(limit, axes=3)
     if shape is not None or dtype is not None:
-        return _raw.make_raw(name, shape, dtype).read(limit)
+        return raw.make_raw(name, shape, dtype).read(limit)
     kind = detect_kind(name)
     if kind == "slices":
         slices = _series.read_series(name, READ_IMAGES, limit, lambda path, most: read(path, limit=most))
-        return _origins.mark(slices, name, False)
+        return origins.mark(slices, name, False)
     if kind not in READERS:
         raise FileError(
             f"{name}: is a {kind} file, which contains one image; volumes are .npy, .npz, .vti, NRRD, NIfTI, Zarr, "
             ".raw, TIFF or folders of numbered slices"
         )
-    return _origins.mark(READERS[kind](name, limit), name, False)
+    return origins.mark(READERS[kind](name, limit), name, False)
 
 
 def write(
@@ -360,7 +360,7 @@ def write(
     if description is not None and not (isinstance(description, str) and description.isascii()):
         raise InvalidInput(f"description: must be an ASCII string, got {description!r}")
     said = Metadata(multiplied=None) if notes is None else as_instance(notes, "notes", Metadata)
-    array = _alpha.adapt(array, _files.as_path(path), said.multiplied)
+    array = _alpha.adapt(array, files.as_path(path), said.multiplied)
     _write(path, array, 2, overwrite, None, description, said.georeference)
 
 
@@ -410,7 +410,7 @@ def write_volume(
     (5, 4, 3, 3)
 
     """
-    _write(path, array, 3, overwrite, spacing, like=None if like is None else _files.as_path(like))
+    _write(path, array, 3, overwrite, spacing, like=None if like is None else files.as_path(like))
 
 
 def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
@@ -446,7 +446,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
     array([0, 1, 2, 3, 4], dtype=uint8)
 
     """
-    target = _files.as_path(path)
+    target = files.as_path(path)
     suffix = target.suffix.lower()
     if suffix not in (".npy", ".tif", ".tiff"):
         raise FileError(f"{target}: the suffix must be one of .npy, .tif, .tiff for slabs; got {suffix!r}")
@@ -494,7 +494,7 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
     134
 
     """
-    target = _files.as_path(path)
+    target = files.as_path(path)
     if target.suffix.lower() != ".stl":
         raise FileError(f"{target}: the suffix must be .stl for surfaces, got {target.suffix!r}")
     corners, triangles = try_array(vertices), try_array(faces)
@@ -506,7 +506,7 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         raise InvalidInput("vertices, faces: vertices must be finite, and faces must contain at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
         raise InvalidInput(f"faces: must contain indices of vertices from 0 to {len(corners) - 1}")
-    with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
+    with atomic(target, overwrite=overwrite) as temporary, files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
 
@@ -520,7 +520,7 @@ def _write(
     tags: Sequence[tuple[int, int, int, object]] = (),
     like: Path | None = None,
 ) -> None:
-    target = _files.as_path(path)
+    target = files.as_path(path)
     suffix = find_suffix(target).lower()
     if suffix not in FORMATS and suffix != STORE:
         raise FileError(f"{target}: the suffix must be one of {', '.join(FORMATS)}, {STORE}; got {suffix!r}")
@@ -532,7 +532,7 @@ def _write(
     if suffix == STORE:
         _zarr.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
         return
-    with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
+    with atomic(target, overwrite=overwrite) as temporary, files.translate_errors(target, "writing"):
         # Image formats do not have bool, so write 0 and 255.
         if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
             array = array.astype(np.uint8) * np.uint8(255)
@@ -563,13 +563,13 @@ def _write(
                 header = _find_header(like, "nii", "nii.gz")
                 _volumes.write_nifti(temporary, flat, steps, header, compressed=suffix == ".nii.gz")
             case ".exr":
-                _exr_layers.write_image(temporary, flat)
+                exr_layers.write_image(temporary, flat)
             case ".png" | ".hdr":
-                file = _image_io.encode(target, flat, suffix[1:])
+                file = image_io.encode(target, flat, suffix[1:])
                 described = suffix == ".png" and description is not None
                 temporary.write_bytes(_png_chunks.describe_png(file, description or "") if described else file)
             case _:
-                temporary.write_bytes(_pillow.encode(target, flat, suffix))
+                temporary.write_bytes(pillow.encode(target, flat, suffix))
 
 
 def _find_header(like: Path | None, *kinds: str) -> Any:

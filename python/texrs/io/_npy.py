@@ -17,8 +17,8 @@ from texrs._notices import ignore
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput, LimitExceeded
-from texrs.io._files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
 from texrs.io._texts import MEMBER
+from texrs.io.files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
 
 MAGIC = b"\x93NUMPY"
 

@@ -12,7 +12,7 @@ import numpy as np
 from texrs._notices import ignore
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_size
+from texrs.io.files import check_size
 
 __all__ = ["is_series", "list_slices", "read_series"]
 

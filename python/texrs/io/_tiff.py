@@ -20,9 +20,9 @@ import numpy as np
 from texrs._notices import assume, ignore
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io import _image_io, _pillow
-from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
+from texrs.io import image_io, pillow
 from texrs.io._notes import INCH, MARK, NODATA, Metadata
+from texrs.io.files import check_file, check_size, load, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
 _DEFLATE, _LZMA, _PACKBITS, _ZSTD = frozenset({8, 32946}), 34925, 32773, frozenset({34926, 50000})
@@ -111,17 +111,17 @@ def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channe
     outer = series.axes[: len(series.axes) - len(first.axes)]
     pages = [page.index for page in series.pages if page is not None]
     plain = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB) and len(pages) == first.planarconfig == 1
-    compiled = plain and first.compression == _LZW and series.dtype in _image_io.OF_TIFF
+    compiled = plain and first.compression == _LZW and series.dtype in image_io.OF_TIFF
 
     def decode() -> Array:
-        return _part_alpha(path, _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first)
+        return _part_alpha(path, image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels), first)
 
     # Prefer the compiled decoder, which prints nothing about corrupt strips, but does not read all tiles.
     if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
         return decode()
     with suppress(FileError, OSError, ValueError, SyntaxError, TypeError, KeyError):
         if set(first.axes) <= set("YXS") and len(pages) == prod(size[a] for a in outer):
-            array = _pillow.read_pages(path, series.dtype, sides[1:], pages)
+            array = pillow.read_pages(path, series.dtype, sides[1:], pages)
             array = array.reshape(*(size[a] for a in outer), *array.shape[1:])
             if "C" in outer:
                 array = np.moveaxis(array, outer.index("C"), -2)
@@ -405,7 +405,7 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
 def _measure(compression: int, data: bytes, most: int) -> int:
     """Return the number of unpacked bytes, or a number above ``most`` if it is larger."""
     if compression in _PICTURES:
-        return _pillow.measure(data)
+        return pillow.measure(data)
     if compression in _DEFLATE:
         return len(zlib.decompressobj().decompress(data, most + 1))
     if compression == _LZMA:

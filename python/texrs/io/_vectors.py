@@ -6,9 +6,9 @@ from texrs._checks import as_limit
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _files
-from texrs.io._formats import detect_kind
-from texrs.io._grids import VECTORS
+from texrs.io import files
+from texrs.io.formats import detect_kind
+from texrs.io.grids import VECTORS
 
 SPATIAL = ("nrrd", "nii", "nii.gz", "vti")
 """Formats whose vectors have the components x, y, z."""
@@ -52,7 +52,7 @@ def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bo
     ((4, 5, 6, 3), False)
 
     """
-    name, most = _files.as_path(path), as_limit(limit, axes=3)
+    name, most = files.as_path(path), as_limit(limit, axes=3)
     kind = detect_kind(name)
     if kind not in VECTORS:
         raise FileError(f"{name}: is a {kind} file; vectors must be in .npy, .npz, Zarr, NRRD, NIfTI, .vti or TIFF")

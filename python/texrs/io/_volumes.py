@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_file, check_size, translate_errors
+from texrs.io.files import check_file, check_size, translate_errors
 
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"

@@ -18,7 +18,7 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_file, check_length, check_size, translate_errors
+from texrs.io.files import check_file, check_length, check_size, translate_errors
 
 VTI_MAGIC = (b'<?xml version="1.0"?>\n<VTKFile', b"<VTKFile", b"<?xml")
 _SPACING = re.compile(rb"<ImageData\b[^>]*\bSpacing\s*=\s*[\"']([^\"'<>]{1,200})[\"']", re.IGNORECASE)

@@ -13,9 +13,9 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import BYTES_PER_PIXEL, as_path, check_size, translate_errors
-from texrs.io._ome import describe_image
-from texrs.io._temporary import name_temporary, put, settle
+from texrs.io.files import BYTES_PER_PIXEL, as_path, check_size, translate_errors
+from texrs.io.ome import describe_image
+from texrs.io.temporary import name_temporary, put, settle
 
 MARKS = ("zarr.json", ".zarray", ".zgroup")
 """Files that mark a folder as a Zarr array or group. Each such folder contains one of them."""

@@ -21,8 +21,8 @@ Traceback (most recent call last):
 texrs.errors.LimitExceeded: size: (1024, 1024) has 1048576 pixels, more than the limit of 500000; texrs.CornerTiles creates ...
 """
 
-from texrs.limits._context import Limits, context, current, set
-from texrs.limits._estimates import estimate_memory
+from texrs.limits.active import Limits, context, current, set
+from texrs.limits.estimates import estimate_memory
 
 __all__ = ["Limits", "context", "current", "estimate_memory", "set"]
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from texrs._colours import to_light, to_pixels, to_share
 from texrs._notices import ignore
-from texrs.materials._conventions import CONVENTIONS, File, cut_name
-from texrs.materials._lit_maps import find_map
 from texrs.materials._map import Map
 from texrs.materials._packing import invert, join, list_quantities, make_plain, unpack_maps
 from texrs.materials._roles import Role
-from texrs.materials._surface import list_signed
+from texrs.materials.conventions import CONVENTIONS, File, cut_name
+from texrs.materials.lit_maps import find_map
+from texrs.materials.surface import list_signed
 
 __all__ = ["arrange_maps"]
 

@@ -143,7 +143,7 @@ class Exports(Mapping[str, Map]):
         ['T_material_D.png', 'T_material_H.exr']
 
         """
-        from texrs.materials._files import write_maps
+        from texrs.materials.files import write_maps
 
         as_one(depth, "depth", None, 8, 16, 32)
         as_bool(mipmaps, "mipmaps")
@@ -153,8 +153,8 @@ class Exports(Mapping[str, Map]):
     def _list_files(self, pack: str | None, convention: str | None) -> Mapping[str, Map]:
         """Return the maps to be written, repacked and renamed as requested."""
         from texrs.materials._arranging import arrange_maps
-        from texrs.materials._conventions import as_convention
         from texrs.materials._packing import pack_maps, unpack_maps
+        from texrs.materials.conventions import as_convention
 
         as_one(pack, "pack", None, "orm", "none")
         if convention is not None:
@@ -262,7 +262,7 @@ class Exports(Mapping[str, Map]):
         ['stones.gltf', 'stones.bin', 'stones_normal.png', 'stones_basecolor.png']
 
         """
-        from texrs.materials._gltf import write_gltf
+        from texrs.materials.gltf import write_gltf
 
         self._check_flat()
         as_one(depth, "depth", 8, 16)

@@ -31,11 +31,11 @@ from texrs._notices import assume, ignore
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io import read_metadata
-from texrs.io._exr_layers import read_layers, write_layers
-from texrs.io._files import as_path
-from texrs.materials._files import report_colours, shorten, show_names
+from texrs.io.exr_layers import read_layers, write_layers
+from texrs.io.files import as_path
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, as_role, guess_role
+from texrs.materials.files import report_colours, shorten, show_names
 
 __all__ = ["read_exr", "write_exr"]
 

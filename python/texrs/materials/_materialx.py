@@ -16,14 +16,14 @@ import numpy as np
 from texrs import io
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
-from texrs.io._files import as_path
-from texrs.materials._converting import convert
-from texrs.materials._files import choose_suffix, write_maps
-from texrs.materials._lit_maps import find_map
+from texrs.io.files import as_path
 from texrs.materials._map import Map
 from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role, guess_role
-from texrs.materials._surface import GREY, METAL, ROUGH, list_signed, measure_relief, measure_slopes, take_normals
+from texrs.materials.converting import convert
+from texrs.materials.files import choose_suffix, write_maps
+from texrs.materials.lit_maps import find_map
+from texrs.materials.surface import GREY, METAL, ROUGH, list_signed, measure_relief, measure_slopes, take_normals
 
 __all__ = ["write_materialx"]
 

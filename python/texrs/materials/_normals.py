@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from texrs._notices import assume
 from texrs._typing import Array
-from texrs.materials._lit_maps import decode_normals, find_map
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, states_y
-from texrs.materials._surface import list_signed
-from texrs.source_map._vectors import stores_z
+from texrs.materials.lit_maps import decode_normals, find_map
+from texrs.materials.surface import list_signed
+from texrs.source_map.vectors import stores_z
 
 __all__ = ["settle_normals"]
 

@@ -10,11 +10,11 @@ import numpy as np
 from texrs._colours import to_light, to_pixels, to_share
 from texrs._notices import assume
 from texrs._typing import Array
-from texrs.materials._conventions import cut_name
-from texrs.materials._lit_maps import decode_normals, find_map
 from texrs.materials._map import Map, take_channels
 from texrs.materials._roles import Role
-from texrs.materials._surface import METAL, ROUGH, list_signed
+from texrs.materials.conventions import cut_name
+from texrs.materials.lit_maps import decode_normals, find_map
+from texrs.materials.surface import METAL, ROUGH, list_signed
 
 __all__ = ["flip_y", "join", "list_quantities", "make_plain", "pack_maps", "unpack_maps"]
 

@@ -19,11 +19,11 @@ from texrs._arrays import as_float, as_int, as_tuple, exp_single
 from texrs._colours import encode_srgb, shrink
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.materials._lit_maps import find_map
 from texrs.materials._map import Map
 from texrs.materials._packing import make_plain
 from texrs.materials._roles import Role
-from texrs.materials._surface import find_opacity, list_signed, measure_slopes, take_colour, take_normals, take_surface
+from texrs.materials.lit_maps import find_map
+from texrs.materials.surface import find_opacity, list_signed, measure_slopes, take_colour, take_normals, take_surface
 
 __all__ = ["render_preview"]
 

@@ -16,16 +16,16 @@ from texrs._arrays import as_bool, as_float, as_int, as_one, to_unit
 from texrs._progress import answering, listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 from texrs.materials import Map, Role
 from texrs.painting._baking import bake_points, fill_between, lean
 from texrs.painting._directions import field_on_surface
-from texrs.painting._files import write_mesh
 from texrs.painting._meshes import find_tangents, shade
-from texrs.painting._reading import read_mesh
 from texrs.painting._relief import bake_frames, carve, read_slopes
 from texrs.painting._sets import UnwrappedMesh, lay_flat
 from texrs.painting._surface import MESH, PAINTED, Surface
+from texrs.painting.files import write_mesh
+from texrs.painting.reading import read_mesh
 from texrs.papers.solid.window import SolidTexture
 
 __all__ = ["TexturedMesh", "field_on_surface", "texture_mesh"]

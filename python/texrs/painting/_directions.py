@@ -23,8 +23,8 @@ from texrs._arrays import as_float, as_int
 from texrs.errors import FileError, InvalidInput
 from texrs.fields import Field, from_directions
 from texrs.painting._meshes import find_normals
-from texrs.painting._reading import read_mesh
 from texrs.painting._surface import Floats64
+from texrs.painting.reading import read_mesh
 
 __all__ = ["field_on_surface"]
 

@@ -9,8 +9,8 @@ not show a plane.
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import FOV, MAX_SLANT, Plane
-from texrs.planes._sizes import ScaleEstimate, measure_scale
 from texrs.planes._view import PlaneView
+from texrs.planes.sizes import ScaleEstimate, measure_scale
 
 __all__ = ["FOV", "MAX_SLANT", "Plane", "PlaneView", "ScaleEstimate", "find", "find_ground", "measure_scale"]
 

@@ -18,8 +18,8 @@ from texrs.errors import InvalidInput
 from texrs.planes._lines import find_lines, lean
 from texrs.planes._patterns import LEAST, blur_levels, follow
 from texrs.planes._plane import FOV, Plane
-from texrs.planes._projective import find_focal
-from texrs.scale_maps._auto import take_grey
+from texrs.planes.projective import find_focal
+from texrs.scale_maps.auto import take_grey
 
 __all__ = ["find"]
 

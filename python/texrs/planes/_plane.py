@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from texrs._arrays import as_array, as_float, as_size
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.planes._projective import along, as_places, find_focal, lift, to_digits, to_grid, transform
-from texrs.scale_maps._kinds import AREAS, ScaleMap, as_kind, find_kind
-from texrs.scale_maps._maps import MIN_SCALE, as_map
-from texrs.scale_maps._slope import Slope
+from texrs.planes.projective import along, as_places, find_focal, lift, to_digits, to_grid, transform
+from texrs.scale_maps.kinds import AREAS, ScaleMap, as_kind, find_kind
+from texrs.scale_maps.maps import MIN_SCALE, as_map
+from texrs.scale_maps.slope import Slope
 
 __all__ = ["FOV", "MAX_SLANT", "Plane"]
 

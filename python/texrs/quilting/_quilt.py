@@ -13,7 +13,7 @@ from texrs._engine.stitcher import Samples
 from texrs._typing import Bools, Floats
 from texrs.quilting._windows import Window
 from texrs.source_map import SourceMap
-from texrs.source_map._pixels import Pixels
+from texrs.source_map.pixels import Pixels
 
 COLOUR, DEPTH = 1.0, 1.0
 """Weights of a seam's cost: squared colour differences, and depth of its pixels inside elements."""

@@ -36,17 +36,17 @@ References
 """
 
 from texrs.scale_maps._angles import MAX_SLANT, from_angles, slant_for_ratio
-from texrs.scale_maps._auto import auto_mask
 from texrs.scale_maps._edit import edit
 from texrs.scale_maps._extrapolation import extend
 from texrs.scale_maps._false_colours import Encoding, decode, encode, picture
-from texrs.scale_maps._jacobians import jacobians_of_coordinates, jacobians_of_normals
-from texrs.scale_maps._kinds import ScaleMap
-from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE
 from texrs.scale_maps._mask import Measure, from_mask
 from texrs.scale_maps._measuring import Measuring
-from texrs.scale_maps._resample import resample
-from texrs.scale_maps._trend import Trend
+from texrs.scale_maps.auto import auto_mask
+from texrs.scale_maps.jacobians import jacobians_of_coordinates, jacobians_of_normals
+from texrs.scale_maps.kinds import ScaleMap
+from texrs.scale_maps.maps import MAX_SCALE, MIN_SCALE
+from texrs.scale_maps.resampling import resample
+from texrs.scale_maps.trend import Trend
 
 __all__ = [
     "MAX_SCALE",

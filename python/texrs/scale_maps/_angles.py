@@ -9,8 +9,8 @@ import numpy as np
 
 from texrs._arrays import as_float, as_size
 from texrs.errors import InvalidInput
-from texrs.scale_maps._kinds import ScaleMap
-from texrs.scale_maps._maps import MIN_SCALE
+from texrs.scale_maps.kinds import ScaleMap
+from texrs.scale_maps.maps import MIN_SCALE
 
 MAX_SLANT = 85.0
 """Maximum slant of a plane, in degrees."""

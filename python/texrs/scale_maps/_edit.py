@@ -14,9 +14,9 @@ from texrs._arrays import exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._blur import blur
-from texrs.scale_maps._kinds import find_kind, keep_kind
-from texrs.scale_maps._maps import as_map
 from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weights
+from texrs.scale_maps.kinds import find_kind, keep_kind
+from texrs.scale_maps.maps import as_map
 
 _LEAST, _LARGEST = 1 / 8, 8.0
 """Smallest and largest scale that a step can produce."""

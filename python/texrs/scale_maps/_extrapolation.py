@@ -8,9 +8,9 @@ from texrs._arrays import as_image, as_mask, exp_single, log_single, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels import poisson
-from texrs.scale_maps._kinds import find_kind, keep_kind
-from texrs.scale_maps._maps import MAX_SCALE, MIN_SCALE, as_map
-from texrs.scale_maps._trend import Trend, as_trend, follow_kind
+from texrs.scale_maps.kinds import find_kind, keep_kind
+from texrs.scale_maps.maps import MAX_SCALE, MIN_SCALE, as_map
+from texrs.scale_maps.trend import Trend, as_trend, follow_kind
 
 
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:

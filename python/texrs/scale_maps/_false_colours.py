@@ -13,7 +13,7 @@ from texrs._checks import check_memory, check_pixels
 from texrs._digits import write_number
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.scale_maps._maps import as_map
+from texrs.scale_maps.maps import as_map
 
 Encoding: TypeAlias = Literal["log2", "paper"]
 

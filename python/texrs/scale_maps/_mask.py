@@ -11,10 +11,10 @@ from texrs._arrays import as_bool, as_choice, as_image, as_int, as_mask, exp_sin
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extrapolation import extend
-from texrs.scale_maps._kinds import AREAS, Kind, ScaleMap
-from texrs.scale_maps._maps import centre_logs
-from texrs.scale_maps._trend import Trend, as_trend, follow_kind, gradient
 from texrs.scale_maps._windows import Lattice, smooth
+from texrs.scale_maps.kinds import AREAS, Kind, ScaleMap
+from texrs.scale_maps.maps import centre_logs
+from texrs.scale_maps.trend import Trend, as_trend, follow_kind, gradient
 
 Measure: TypeAlias = Literal["boundary", "skeleton", "count", "area"]
 """Quantity to measure in a mask."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from texrs._arrays import as_bool, as_float
 from texrs._typing import Bools, Floats
-from texrs.scale_maps._auto import auto_mask
 from texrs.scale_maps._mask import from_mask
-from texrs.scale_maps._trend import Trend, as_trend
+from texrs.scale_maps.auto import auto_mask
+from texrs.scale_maps.trend import Trend, as_trend
 
 LARGEST_DETAIL = 4096.0
 """Upper limit of `min_feature_size`, in pixels. Each image also limits it to a quarter of its shorter side."""

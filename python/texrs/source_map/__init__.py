@@ -25,9 +25,9 @@ from texrs.source_map._antialias import find_shrinking, gather_smoothed
 from texrs.source_map._files import read_map, write_map
 from texrs.source_map._finish import RenderOptions
 from texrs.source_map._parts import Parted
-from texrs.source_map._pixels import Pixels, divide_bands
 from texrs.source_map._reuse import CopyStatistics, find_continued, measure_reuse
-from texrs.source_map._vectors import stores_z, turn_all
+from texrs.source_map.pixels import Pixels, divide_bands
+from texrs.source_map.vectors import stores_z, turn_all
 
 __all__ = ["CopyStatistics", "RenderOptions", "SourceMap"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from texrs._typing import Bools
 from texrs.source_map._parts import Parted
-from texrs.source_map._pixels import label_pieces
+from texrs.source_map.pixels import label_pieces
 
 __all__ = ["CopyStatistics", "find_continued", "measure_reuse"]
 

@@ -56,13 +56,13 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
-from texrs.tiling._borders import SEEN
-from texrs.tiling._check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
 from texrs.tiling._enlarging import Enlarging, enlarge, find_obstacle
 from texrs.tiling._joints import Choice, Joined, find_joint, make_levels
 from texrs.tiling._lighting_choice import is_uneven, name_image
 from texrs.tiling._maps import PIECES, lay_out
 from texrs.tiling._whole_elements import SMALLEST, WholeElements, find_whole_elements
+from texrs.tiling.borders import SEEN
+from texrs.tiling.check import AXES, Tiling, check_result, check_tiling, find_tiled, report_tiling
 
 __all__ = ["Tiling", "check_tiling", "tile"]
 

@@ -10,7 +10,7 @@ from texrs._lighting_correction import BRIGHTEST, measure_unevenness
 from texrs._notices import assume
 from texrs._typing import Array
 from texrs.exemplar import Exemplar
-from texrs.io import _origins
+from texrs.io import origins
 from texrs.materials import Material, Role
 
 UNEVEN, SMALL = 1.6, 128
@@ -27,7 +27,7 @@ STEP = 4
 
 def name_image(image: Exemplar | Material) -> str:
     """Return the name of the file that an image was read from, or the name of the argument if the file is unknown."""
-    origin = None if isinstance(image, Material) else _origins.find(image.image)
+    origin = None if isinstance(image, Material) else origins.find(image.image)
     return "image" if origin is None else origin[0]
 
 

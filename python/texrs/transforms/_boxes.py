@@ -9,7 +9,7 @@ from texrs._arrays import as_array, as_float, as_instance, check_finite
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
-from texrs.source_map._pixels import label_pieces
+from texrs.source_map.pixels import label_pieces
 
 LOOSE = 0.5
 """Maximum deviation, in pixels, of the step between adjacent pixels of one piece from their Jacobian."""

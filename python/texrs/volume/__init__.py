@@ -21,7 +21,6 @@ Statistics: each function can be used alone, and most of them also accept images
 ===========================  ===============================================================
 """
 
-from texrs.volume._stretch import cubes
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.labels import extract_surface, label_to_color
@@ -35,6 +34,7 @@ from texrs.volume.statistics import (
     lineal_path_function,
     two_point_correlation,
 )
+from texrs.volume.stretch import cubes
 from texrs.volume.structure import (
     autocorrelation,
     frequency,

@@ -14,12 +14,12 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
-from texrs.fields._spaced import as_distances, find_distances, space
+from texrs.fields.spaced import as_distances, find_distances, space
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
-from texrs.volume._values import check_field, guess_axes, turn_in_space
 from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.usage import CellReuse, cell_reuse
+from texrs.volume.values import check_field, guess_axes, turn_in_space
 
 __all__ = ["Comparison", "compare"]
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_bool, as_float, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.volume._values import as_direction
+from texrs.volume.values import as_direction
 
 __all__ = ["extract_surface", "label_to_color"]
 

@@ -16,9 +16,9 @@ from texrs._progress import answering, ask, listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 from texrs.kernels.gather import gather
-from texrs.volume._values import as_direction
+from texrs.volume.values import as_direction
 
 __all__ = ["oblique_slice", "render_block", "slices", "turntable"]
 

@@ -17,8 +17,8 @@ from texrs._arrays import as_int
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.fields._spaced import as_distances, find_distances
-from texrs.volume._values import as_colours, as_region, by_distance, correlate, drop_first, drop_last
+from texrs.fields.spaced import as_distances, find_distances
+from texrs.volume.values import as_colours, as_region, by_distance, correlate, drop_first, drop_last
 
 __all__ = [
     "Classes",

@@ -15,8 +15,8 @@ from texrs._arrays import as_bool, as_float, as_int, as_wrap, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.fields._spaced import as_distances, find_distances, space
-from texrs.volume._values import as_values, by_distance, check_field, correlate, drop_first, drop_last, turn_in_space
+from texrs.fields.spaced import as_distances, find_distances, space
+from texrs.volume.values import as_values, by_distance, check_field, correlate, drop_first, drop_last, turn_in_space
 
 __all__ = [
     "autocorrelation",

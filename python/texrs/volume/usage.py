@@ -13,8 +13,8 @@ from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
-from texrs.source_map._pixels import label_pieces
-from texrs.volume._values import check_field
+from texrs.source_map.pixels import label_pieces
+from texrs.volume.values import check_field
 
 __all__ = ["CellReuse", "cell_reuse", "coherence"]
 

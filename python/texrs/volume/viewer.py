@@ -11,7 +11,7 @@ from texrs._typing import Path
 from texrs._viewer import as_page
 from texrs.errors import FileError
 from texrs.io import atomic
-from texrs.io._files import as_path
+from texrs.io.files import as_path
 from texrs.volume.labels import label_to_color
 
 __all__ = ["Viewer"]

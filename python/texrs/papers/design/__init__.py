@@ -99,7 +99,7 @@ from texrs.papers.design.report import describe, draw_stages
 from texrs.papers.design.texture import correct_colours, look_up
 from texrs.papers.design.trials import choose_other, choose_plan, make_composite
 from texrs.synthesis import Synthesis
-from texrs.tiling._check import check_result, report_tiling
+from texrs.tiling.check import check_result, report_tiling
 
 __all__ = ["DeformationOptions", "design", "design_variants"]
 

@@ -60,7 +60,7 @@ from texrs.papers.perspective.sizes import Sizes
 from texrs.papers.perspective.surfaces import PreparedExemplar, lay_out
 from texrs.planes import Plane
 from texrs.scale_maps import Measuring
-from texrs.scale_maps._kinds import Kind
+from texrs.scale_maps.kinds import Kind
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 

@@ -12,7 +12,7 @@ from texrs._arrays import as_float, try_array
 from texrs.errors import InvalidInput
 from texrs.fields import Field, parse
 from texrs.papers.perspective.targets import Surface
-from texrs.scale_maps._resample import stretch
+from texrs.scale_maps.resampling import stretch
 
 __all__ = ["as_turn"]
 

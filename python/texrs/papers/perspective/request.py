@@ -29,11 +29,11 @@ from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.papers.perspective.targets import Surface, as_surface, as_target, find_size, is_map, is_words, read_plane
 from texrs.planes import FOV, Plane
 from texrs.planes import ScaleEstimate as Measured
-from texrs.planes._choose import measure_known_scale
+from texrs.planes.choose import measure_known_scale
 from texrs.scale_maps import Measuring
-from texrs.scale_maps._jacobians import measure_sizes
-from texrs.scale_maps._kinds import AREAS, Kind, as_kind, find_kind
-from texrs.scale_maps._maps import as_map
+from texrs.scale_maps.jacobians import measure_sizes
+from texrs.scale_maps.kinds import AREAS, Kind, as_kind, find_kind
+from texrs.scale_maps.maps import as_map
 
 __all__ = ["Method", "Request"]
 

@@ -12,7 +12,7 @@ from texrs._arrays import as_float, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
-from texrs.scale_maps._slope import Slope
+from texrs.scale_maps.slope import Slope
 
 __all__ = ["Outside", "Sizes", "bring_within", "check_sizes", "choose_sizes", "count_samples"]
 

@@ -15,8 +15,8 @@ from texrs.exemplar.frontal import Frontal
 from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane, multiply
 from texrs.papers.perspective.request import Request
 from texrs.papers.perspective.sizes import Outside, bring_within, choose_sizes
-from texrs.planes._projective import find_focal
-from texrs.scale_maps._slope import LEVEL, Slope
+from texrs.planes.projective import find_focal
+from texrs.scale_maps.slope import LEVEL, Slope
 
 __all__ = ["PreparedExemplar", "lay_out"]
 

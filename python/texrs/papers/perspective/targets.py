@@ -18,9 +18,9 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.planes import Plane
 from texrs.scale_maps import jacobians_of_coordinates, jacobians_of_normals
-from texrs.scale_maps._jacobians import as_jacobians
-from texrs.scale_maps._maps import as_map
-from texrs.scale_maps._resample import stretch
+from texrs.scale_maps.jacobians import as_jacobians
+from texrs.scale_maps.maps import as_map
+from texrs.scale_maps.resampling import stretch
 
 __all__ = ["Surface", "as_surface", "as_target", "find_size", "is_map", "is_words", "read_plane"]
 

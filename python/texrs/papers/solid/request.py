@@ -16,7 +16,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
 from texrs.fields import as_field as make_field
-from texrs.fields._spaced import as_distances, find_distances
+from texrs.fields.spaced import as_distances, find_distances
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
 from texrs.papers.solid.memory_check import LARGER, check_region

@@ -20,13 +20,13 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field, FieldLike
-from texrs.fields._field import as_points
-from texrs.fields._spaced import as_distances, find_distances
+from texrs.fields.field import as_points
+from texrs.fields.spaced import as_distances, find_distances
 from texrs.growth import Windows
 from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
 from texrs.materials import Material
-from texrs.materials._material import apply_materials
+from texrs.materials.material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.memory_check import LARGER, check_region, estimate_bytes
 from texrs.papers.solid.parts import Endless

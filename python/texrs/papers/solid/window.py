@@ -13,8 +13,8 @@ from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 from texrs.papers.solid.ranges import MAX_COORDINATE
 from texrs.papers.solid.unbounded import Texture
-from texrs.volume._values import as_direction
 from texrs.volume.rendering import as_steps
+from texrs.volume.values import as_direction
 
 __all__ = ["PlaneTexture", "SolidTexture"]
 

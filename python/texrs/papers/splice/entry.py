@@ -13,7 +13,7 @@ from texrs._arrays import as_image, as_ndarray, as_wrap
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
 from texrs.elements import ElementAnalysis, analyse
-from texrs.elements._arguments import as_points
+from texrs.elements.arguments import as_points
 from texrs.errors import InvalidInput, LimitExceeded
 
 __all__ = ["as_elements", "remember"]

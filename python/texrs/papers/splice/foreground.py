@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Labels
 from texrs.elements import ElementAnalysis
-from texrs.elements._foreground import divide_foreground
-from texrs.elements._known import extend_points
+from texrs.elements.foreground import divide_foreground
+from texrs.elements.known import extend_points
 from texrs.papers.splice.entry import remember
 
 __all__ = ["Foreground", "split_foreground"]

@@ -17,7 +17,7 @@ from texrs._arrays import check_memory
 from texrs._typing import Bools, Labels
 from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
-from texrs.limits._estimates import BEYOND
+from texrs.limits.estimates import BEYOND
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import split_foreground
 from texrs.point_sets import Fold, PointLayout

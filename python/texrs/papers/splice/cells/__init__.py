@@ -31,7 +31,7 @@ from texrs._arrays import as_image, guidance
 from texrs._cache import Cache, content_hash
 from texrs._typing import Labels, Progress
 from texrs.elements import ElementAnalysis, Layout
-from texrs.elements._instances import find_sure_cells
+from texrs.elements.instances import find_sure_cells
 from texrs.exemplar.cells import Cells, fill_gaps
 from texrs.exemplar.shapes import mark_outlines
 from texrs.exemplar.symmetry import find_mirrors
