@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 import texrs
-from texrs import samples
+from texrs import elements, samples
 from texrs.errors import InvalidInput
-from texrs.exemplar.element_finder import FoundElements, find_elements
+from texrs.exemplar.element_finder import FoundElements, _finder, find_elements
 from texrs.exemplar.element_finder._candidates import Candidates, make_leaves, measure
 from texrs.exemplar.element_finder._contour_strength import find_contours
 from texrs.exemplar.element_finder._overlaps import find_overlaps
@@ -109,6 +109,31 @@ def test_other_types_of_one_image_give_one_result() -> None:
     # The colours are the same, so the result is the cached one.
     assert find_elements(image.astype(np.uint16) * 257) is expected
     assert find_elements(image.astype(np.float32) / np.float32(255)) is expected
+
+
+def test_all_functions_share_one_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    image = np.roll(samples.dots((96, 96)).image, 7, axis=1)
+    calls: list[int] = []
+    monkeypatch.setattr(_finder, "analyse", lambda *given, run=_finder.analyse: calls.append(1) or run(*given))
+    exemplar = texrs.Exemplar(image, repeat=False)
+    found, parts, separate, view = exemplar.elements, exemplar.segment(), exemplar.instances, elements.analyse(image)
+    texrs.Exemplar(np.dstack([image, np.full((96, 96), 255, np.uint8)])).segment()
+    assert len(calls) == 1
+    assert parts.elements is found.labels
+    assert separate is not None
+    assert np.array_equal(separate.labels > 0, found.labels > 0)
+    assert np.array_equal(view.labels > 0, found.labels > 0)
+
+
+def test_separate_elements_continue_across_periodic_borders() -> None:
+    image = np.roll(samples.dots((128, 128)).image, 20, axis=0)
+    image = np.concatenate([image, image[::-1]])
+    found = [texrs.Exemplar(image, repeat=(repeat, False)).instances for repeat in (False, True)]
+    assert found[0] is not None
+    assert found[1] is not None
+    assert found[1].count < found[0].count
+    ends = found[1].labels[[0, -1]]
+    assert (ends[0] == ends[1])[(ends > 0).all(axis=0)].all()
 
 
 def test_grey_images_of_any_shape_are_allowed() -> None:

@@ -217,7 +217,7 @@ def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
     assert exemplar.stitcher.guessed
     assert not exemplar.stitcher.separate
     torn = [evaluate(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source_map).torn for seed in range(3)]
-    monkeypatch.setattr(_exemplar, "guess_instances", lambda parts: None)
+    monkeypatch.setattr(_exemplar, "find_instances", lambda colours, wrap: None)
     # Use other options, so that it is another exemplar without cached facts.
     unaware = texrs.Exemplar(picture, repeat=False, labels=False)
     assert not unaware.stitcher.guessed

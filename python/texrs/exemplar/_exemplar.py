@@ -42,7 +42,7 @@ from texrs.exemplar.analysis import (
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.separate_elements import Instances, as_instances, find_instances
-from texrs.exemplar.stitching import guess_instances, make_stitcher
+from texrs.exemplar.stitching import make_stitcher
 from texrs.exemplar.symmetry import Flip, find_mirrors
 from texrs.io import origins
 
@@ -306,17 +306,23 @@ class Exemplar:
     @property
     def instances(self) -> Instances | None:
         """The separate elements, in two or three axes. None if the evidence for elements is uncertain."""
+        found = self._instances
+        return found if found is not None and found.sure else None
+
+    @property
+    def _instances(self) -> Instances | None:
         if self.labels:
             return self.cached("instances", lambda: as_instances(self._pixels[..., 0], self.repeat))
-        return self.cached("instances", lambda: find_instances(self.colours, self.repeat))
+        colours = self.guidance if self._axes == 2 else self.colours
+        return self.cached("instances", lambda: find_instances(colours, self.repeat))
 
     @property
     def stitcher(self) -> Stitcher:
         """The exemplar prepared for cutting patches: its elements, and the costs of neighbouring colours.
 
-        If the elements are uncertain, seams through the elements that `segment` finds in an image only cost more.
+        If the elements of an image are not separate, seams through them only cost more.
         """
-        return self.cached("stitcher", self._make_stitcher)
+        return self.cached("stitcher", lambda: make_stitcher(self.colours, self.repeat, self._instances))
 
     @property
     def mirror_symmetries(self) -> tuple[Flip, ...]:
@@ -521,11 +527,6 @@ class Exemplar:
             raise FileError(f"{path}: the file is damaged ({error})") from None
         made._facts["analysis", (2,), COARSEST] = analysis
         return made
-
-    def _make_stitcher(self) -> Stitcher:
-        found = self.instances
-        sure = found is not None or self._axes == 3 or self.labels
-        return make_stitcher(self.colours, self.repeat, found if sure else guess_instances(self.segment()), sure=sure)
 
     def _measure(self, levels: int) -> tuple[bool, ...]:
         return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat

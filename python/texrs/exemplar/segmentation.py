@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_choice, as_float, as_image, as_instance, as_int, as_list, as_rgb, to_unit, try_array
+from texrs._arrays import (
+    as_choice,
+    as_float,
+    as_image,
+    as_instance,
+    as_int,
+    as_list,
+    as_rgb,
+    guidance,
+    to_unit,
+    try_array,
+)
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._progress import answering, ask, listen
@@ -272,17 +283,18 @@ def segment(
     height, width = pixels.shape[:2]
     if options.labels is not None:
         return number_marks(options.labels, (height, width))
-    rgb = np.ascontiguousarray(as_rgb(to_unit(pixels)))
     watch = Steps(progress)
     if options.segmentation == "none" or options.layers is not None:
+        rgb = np.ascontiguousarray(as_rgb(to_unit(pixels)))
         whole = Regions.of(rgb, watch).layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
     # Import the finder only here, because it imports SciPy.
     from texrs.exemplar.element_finder import find_elements
 
+    guide = as_rgb(guidance(pixels))
     with answering(watch):
-        found = None if options.segmentation == "grid" else find_elements(rgb)
-        lattice, courses = find_regularity(rgb) if found is None else (found.lattice, found.courses)
+        found = None if options.segmentation == "grid" else find_elements(guide)
+        lattice, courses = find_regularity(guide) if found is None else (found.lattice, found.courses)
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
     if found is not None:
         fault = find_fault(found)

@@ -1,15 +1,16 @@
-"""Find separate elements of an exemplar by their colours, as areas on a connected background.
+"""Find separate elements of an exemplar, which the stitcher keeps whole.
 
-Colours are reduced to a small palette. The background is the connected part of the palette whose removal leaves many
-bounded areas. A background is accepted only if it meets all criteria. Other textures are better cut by the frequency
-of neighbouring colours (`texrs.exemplar.adjacency`).
+The elements of an image are those of `texrs.exemplar.element_finder`. The elements of a volume are areas on a connected
+background. Its colours are reduced to a small palette. The background is the connected part of the palette whose
+removal leaves many bounded areas, and it is accepted only if it meets all criteria. Other textures are better cut by
+the frequency of neighbouring colours (`texrs.exemplar.adjacency`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,10 @@ from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.adjacency import classify
+from texrs.exemplar.segmentation import SURE, find_fault
+
+if TYPE_CHECKING:
+    from texrs.exemplar.element_finder import FoundElements
 
 __all__ = ["Instances", "find_instances"]
 
@@ -36,6 +41,9 @@ FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
 - Minimum share of colour variance between elements and background.
 - Maximum variance of the background, as a share of the total.
 """
+REACH, DEEP = np.float32(3), np.float32(8)
+"""Depth in pixels beyond which all seams inside an uncertain element cost the same, and the depth that gives this cost.
+"""
 PAD = 12
 """Number of samples added around a periodic exemplar before distances are measured. Larger distances are not exact."""
 
@@ -50,11 +58,14 @@ class Instances:
         Index of the element of each sample, from 1, and 0 for none. Samples where two elements touch are 0.
     depth : float32 array
         Distance of each sample to the background, 0 in the background.
+    sure : bool
+        False if the elements are not separate, as in a heap. Seams inside such elements only cost more.
 
     """
 
     labels: NDArray[np.uint32]
     depth: Floats
+    sure: bool = True
 
     __repr__ = brief
 
@@ -78,6 +89,8 @@ class _Pieces(NamedTuple):
 def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     """Find the separate elements of an exemplar.
 
+    Those of an image are the elements of `texrs.exemplar.element_finder`.
+
     Parameters
     ----------
     colours : (..., C) float32
@@ -88,7 +101,8 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     Returns
     -------
     Instances or None
-        The elements. None if no connected background leaves bounded areas.
+        The elements. None if an image has none or may be a net, or if no connected background of a volume leaves
+        bounded areas.
 
     Examples
     --------
@@ -101,6 +115,11 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     """
     from scipy import ndimage
 
+    if len(wrap) == 2:
+        # Import the finder only here, because it imports SciPy.
+        from texrs.exemplar.element_finder import find_elements
+
+        return _view_instances(find_elements(colours), wrap)
     # Smooth slightly, because grain would divide areas.
     modes = ["wrap" if closed else "nearest" for closed in wrap]
     smooth = np.stack([ndimage.gaussian_filter(colours[..., c], 0.7, mode=modes) for c in range(colours.shape[-1])], -1)
@@ -187,10 +206,14 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
     """Label the connected parts of a mask from 1. Parts continue across periodic axes."""
     from scipy import ndimage
 
-    labels, count = ndimage.label(mask)
+    return join_ends(np.asarray(ndimage.label(mask)[0], np.intp), wrap)
+
+
+def join_ends(labels: NDArray[np.intp], wrap: Sequence[bool]) -> NDArray[np.intp]:
+    """Join parts that touch across the ends of periodic axes, and number the parts from 1."""
     if not any(wrap):
-        return np.asarray(labels, np.intp)
-    roots = np.arange(count + 1)
+        return labels
+    roots = np.arange(int(labels.max()) + 1)
 
     def root(k: int) -> int:
         while roots[k] != k:
@@ -204,8 +227,25 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
             for a, b in np.unique(np.stack([first[both], last[both]], -1), axis=0):
                 low, high = sorted((root(a), root(b)))
                 roots[high] = low
-    parts = np.array([root(k) for k in range(count + 1)])
+    parts = np.array([root(k) for k in range(len(roots))])
     return np.asarray(np.unique(parts, return_inverse=True)[1][labels], np.intp)
+
+
+def _view_instances(found: FoundElements, wrap: Sequence[bool]) -> Instances | None:
+    """Return the elements that the finder found. None if they may be the meshes of a net, or not elements."""
+    from scipy import ndimage
+
+    if find_fault(found):
+        return None
+    labels = join_ends(found.labels.astype(np.intp), wrap)
+    modes = ["wrap" if closed else "nearest" for closed in wrap]
+    high = ndimage.maximum_filter(labels, 3, mode=modes)
+    low = ndimage.minimum_filter(np.where(labels > 0, labels, len(found.elements)), 3, mode=modes)
+    labels[low < high] = 0
+    depth = _measure_depth(labels > 0, wrap)
+    if found.layouts["separate"] >= SURE:
+        return Instances(labels.astype(np.uint32), depth)
+    return Instances(labels.astype(np.uint32), DEEP * np.minimum(depth / REACH, 1), sure=False)
 
 
 def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:

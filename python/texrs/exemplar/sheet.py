@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import atan2, degrees
 from typing import Any, ClassVar
@@ -133,7 +133,7 @@ class Sheet(ABC):
     def stitcher(self) -> tuple[Stitcher, Instances | None]:
         """The sheet prepared for cutting patches, and its elements."""
         found, beside = self.analyse()
-        return make_stitcher(self.colours, OPEN, found, beside=beside), found
+        return make_stitcher(self.colours, OPEN, found, beside), found
 
     @abstractmethod
     def analyse(self) -> tuple[Instances | None, Adjacency]:
@@ -243,7 +243,7 @@ class Flattened(Sheet):
         if found is not None:
             # Label again, because the border of the usable samples can divide an element.
             labels = label_components((found.labels > 0) & self.free, OPEN)
-            found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
+            found = replace(found, labels=labels.astype(np.uint32)) if labels.any() else None
         return found, measure_adjacency(self.colours, OPEN)
 
     def show(self, image: Array) -> Array:
@@ -379,7 +379,7 @@ class Copies(Sheet):
         if found is not None:
             there = np.bincount(labels.ravel()) > 0
             there[0] = False
-            found = Instances(np.where(there, np.cumsum(there), 0).astype(np.uint32)[labels], depth)
+            found = Instances(np.where(there, np.cumsum(there), 0).astype(np.uint32)[labels], depth, found.sure)
         return found, Adjacency(classes, beside.costs)
 
     def show(self, image: Array) -> Array:

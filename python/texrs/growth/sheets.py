@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from texrs._arrays import log_single
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
-from texrs._engine.stitcher import Stitched, Weights
+from texrs._engine.stitcher import Stitched
 from texrs._progress import answering, stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar.sheet import Sheet, code
+from texrs.growth.start import weights_of
 
 __all__ = ["FromSheet", "stitch_sheet"]
 
@@ -25,8 +26,8 @@ OVERLAP = 0.33
 """Overlap of neighbouring patches, as a share of the patch side."""
 CANDIDATES = 4
 """Number of source positions that are tried for each patch. The best one is used."""
-COLOUR, SURPRISE = 0.4, 0.5
-"""Weights of seams. Colours have more weight than for a single scale, because edges of equal size rarely meet."""
+COLOUR = 0.4
+"""Weight of colours at seams. Colours have more weight than for a single scale, because edges of equal size rarely meet."""
 UNIT = 512
 """Weight of a scale error, in 1/256 of a squared unit of log scale.
 
@@ -111,7 +112,7 @@ def stitch_sheet(
 
     """
     with answering(progress, "sheet", 0.0):
-        stitcher, elements = sheet.stitcher
+        stitcher, _ = sheet.stitcher
     wanted = sheet.side(target) if side is None else side
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
     frames = sheet.frames(target, region.wrap) if frames is None else frames
@@ -125,7 +126,7 @@ def stitch_sheet(
         candidates=CANDIDATES,
         bend=len(frames) > 1,
         heal=sheet.heal,
-        weights=Weights(colour=COLOUR, surprise=1.0 if elements is None else SURPRISE, guide=sheet.guide),
+        weights=replace(weights_of(stitcher), colour=COLOUR, guide=sheet.guide),
         seed=seed,
         held=held,
         given=None if given is None else given.reshape(-1),

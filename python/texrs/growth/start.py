@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
-from texrs._engine.stitcher import Weights
+from texrs._engine.stitcher import Stitcher, Weights
 from texrs._progress import answering, stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
@@ -94,7 +94,7 @@ def from_patches(
             overlap=OVERLAP[axes],
             candidates=candidates,
             bend=bent,
-            weights=PLAIN if plain else weights_of(exemplar),
+            weights=PLAIN if plain else weights_of(stitcher),
             seed=seed,
             held=asked.held,
             given=asked.given,
@@ -121,9 +121,8 @@ def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bo
     return not exemplar.stitcher.separate and exemplar.anisotropy >= DIRECTED
 
 
-def weights_of(exemplar: Exemplar) -> Weights:
+def weights_of(stitcher: Stitcher) -> Weights:
     """Return the seam costs for an exemplar, which depend on its elements."""
-    stitcher = exemplar.stitcher
     return SEPARATE if stitcher.separate else GUESSED if stitcher.guessed else ANY
 
 

@@ -320,7 +320,7 @@ def stitch(
         patch=side,
         overlap=OVERLAP[3],
         candidates=CANDIDATES[exemplar.labels],
-        weights=replace(weights_of(exemplar), guide=FORBIDDEN),
+        weights=replace(weights_of(exemplar.stitcher), guide=FORBIDDEN),
         recover=RECOVER,
         repetition=0.0,
         continuation=0.0,

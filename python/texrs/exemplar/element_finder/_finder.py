@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from texrs._arrays import as_image, as_rgb, as_seed, to_unit
+from texrs._arrays import as_image, as_rgb, as_seed, guidance
 from texrs._cache import Cache, content_hash
 from texrs._checks import as_int
 from texrs._progress import answering, ask, listen
@@ -185,7 +185,7 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     Parameters
     ----------
     image : array_like, path_like or PIL.Image.Image
-        Shape (H, W) or (H, W, C), any dtype. The first three channels are colours.
+        Shape (H, W) or (H, W, C), any dtype. The first three channels are colours. Transparent pixels are grey.
     seed : int
         Seed of the pixels that the code words are learned from. Default: 0.
     progress : callable or True, optional
@@ -214,7 +214,7 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     pixels, seed, progress = as_image(image, "image"), as_seed(seed), listen(progress)
     watch = progress or (lambda stage, share: ask())
     # The key contains the colours, so that an image and its colours in [0, 1] share one result.
-    rgb = as_rgb(to_unit(pixels))
+    rgb = as_rgb(guidance(pixels))
     found = _FOUND.get_or_make(
         content_hash(rgb, seed), lambda: analyse(rgb, seed, lambda share: watch("elements", share))
     )

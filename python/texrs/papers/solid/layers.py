@@ -224,7 +224,7 @@ class Layers:
             # Lower layers are cut again later, so only the last layer recovers seams and repairs elements.
             recover=RECOVER[self.axes] if last else 0.0,
             heal=last,
-            weights=weights_of(self.exemplar),
+            weights=weights_of(self.exemplar.stitcher),
             progress=advance,
         )
         return Box.pack(region, shown, bent=self.bent)
@@ -234,7 +234,7 @@ class Layers:
         # Use one point more along each axis, to get the seams at the far borders.
         larger = Region(tuple(n + 1 for n in region.shape), region.origin, region.wrap)
         places, boxes, table = self.ground.show(larger)
-        seams = self.exemplar.stitcher.judge(larger, places, boxes, weights_of(self.exemplar))
+        seams = self.exemplar.stitcher.judge(larger, places, boxes, weights_of(self.exemplar.stitcher))
         here = region.inside(larger)
         near = seams.reshape(*larger.shape, -1)[here].reshape(-1)
         shown = places.reshape(*larger.shape, -1)[here].reshape(-1)

@@ -288,7 +288,7 @@ def grow_ground(
         patch=max(6.0, patch_side(exemplar.shape)),
         overlap=OVERLAP[2],
         candidates=CANDIDATES,
-        weights=weights_of(exemplar),
+        weights=weights_of(exemplar.stitcher),
         seed=seed,
         progress=stage(watch, "ground"),
     )

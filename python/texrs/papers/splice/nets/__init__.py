@@ -161,7 +161,7 @@ def grow_rest(
         patch=float(np.clip(PATCH * unit, 6, min(exemplar.shape) - 1)),
         overlap=OVERLAP[2],
         candidates=CANDIDATES,
-        weights=weights_of(exemplar),
+        weights=weights_of(exemplar.stitcher),
         seed=seed,
         held=~free.ravel(),
         given=(laid.places * ONE).reshape(-1),
