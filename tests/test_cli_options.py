@@ -260,6 +260,7 @@ def test_a_word_means_the_same_in_every_command() -> None:
         "--fov",
         "--source-map",
         "--chunks",
+        "--way",
         "--origin",
     }
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)

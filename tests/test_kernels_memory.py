@@ -36,7 +36,7 @@ KERNELS = {
     "jitter": "_rust.jitter(start, region, none, 4096, 1, 0)",
     "stitcher's source": "_rust.Stitcher(flat, (side, side), (False, False), numbers, depth, bytes_, no_costs)",
     "stitcher": "source.stitch(half, still, patch, weights, (0.1, 4.0, 1.0), 1, none, no_places, none, None, None)",
-    "quilt": "_rust.quilt([(image, None)], pixels, patches_of, patched, begin, [], None)",
+    "quilt": "_rust.quilt([(image, None, (0, 0))], pixels, patches_of, patched, begin, [], None)",
     "stitcher of samples": "_rust.PatchSamples(flat, np.zeros(side * side, np.float32), (0.1, 0.1))",
     "sparse": "_rust.Cholesky(*matrix, 1 << 32)",
     "gather": "_rust.gather([image], (False, False), np.zeros(0, np.uint16), points, 'linear')",

@@ -1,6 +1,8 @@
 """Represent an exemplar: its pixels, features, elements, lattice, colour layers and resized copies."""
 
-from texrs.exemplar import element_finder
+from importlib import import_module
+from types import ModuleType
+
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import Analysis
 from texrs.exemplar.regularity import Lattice
@@ -16,6 +18,13 @@ __all__ = [
     "element_finder",
     "segment",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Load the element finder on first use, because it loads SciPy."""
+    if name != "element_finder":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module("texrs.exemplar.element_finder")
 
 
 def __dir__() -> list[str]:
