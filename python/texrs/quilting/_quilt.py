@@ -113,16 +113,19 @@ def find_phase(first: Picture, other: Picture) -> tuple[float, float]:
     spectra = [np.fft.fft2(cell - cell.mean((0, 1)), axes=(0, 1)) for cell in (one, two)]
     likeness = np.fft.ifft2((spectra[0].conj() * spectra[1]).sum(axis=2)).real
     best = np.unravel_index(int(np.argmax(likeness.round(6))), likeness.shape)
-    shift = np.asarray(first.lattice, float) @ (np.array(best) / FOLDED)
-    return (float(shift[0]), float(shift[1]))
+    i, j = (int(n) / FOLDED for n in best)
+    (a, b), (c, d) = np.asarray(first.lattice, float).tolist()
+    return (a * i + b * j, c * i + d * j)
 
 
 def average_cells(colours: Floats, lattice: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of all cells of a lattice, on a grid of `FOLDED` points along each of its vectors."""
     rows, columns = np.indices(colours.shape[:2])
-    inverse = np.linalg.inv(np.asarray(lattice, float))
-    along = (np.floor(FOLDED * (v[0] * rows + v[1] * columns)).astype(np.int64) % FOLDED for v in inverse)
-    cell = np.ravel_multi_index(tuple(along), (FOLDED, FOLDED)).ravel()
+    # Invert the matrix by hand, because a linear solver is not the same on every processor.
+    (a, b), (c, d) = np.asarray(lattice, float).tolist()
+    times = (d * rows - b * columns) / (a * d - b * c), (a * columns - c * rows) / (a * d - b * c)
+    along = tuple(np.floor(FOLDED * each).astype(np.int64) % FOLDED for each in times)
+    cell = np.ravel_multi_index(along, (FOLDED, FOLDED)).ravel()
     # A point that no pixel is nearest to gets the mean colour.
     count, planes = np.bincount(cell, minlength=FOLDED**2) + 1e-6, np.moveaxis(colours, -1, 0).astype(np.float64)
     means = [(np.bincount(cell, p.ravel(), FOLDED**2) + 1e-6 * p.mean()) / count for p in planes]

@@ -209,8 +209,8 @@ def design(
         - ``arrangement``: For each example: "apart", "heap", "leaves", "full", "layers" or "courses". A "heap" has
           similar shapes, "leaves" are a heap of irregular shapes, and "full" means a lattice or cells.
         - ``way``: Way that each example was laid in.
-        - ``refused``: For each example, the ways that it or the size does not allow, with the reason as one sentence. If
-          whole periods of a lattice do not fit the size, the reason contains the nearest size that they fit.
+        - ``refused``: For each example, the ways that it or the size does not allow, with the reason as one sentence.
+          If a lattice does not fit the size, the reason contains the nearest size that it fits.
         - ``candidates``: For each example, the figures of each way that was tried, or None without a trial. 0 is
           best for ``score`` and the faults. The faults are missing regularity (``irregular``), fine and coarse lines
           that break off (``broken``, ``broken_coarse``) and cells unlike the example (``foreign``). Fine and coarse
