@@ -1,6 +1,5 @@
 """Represent an exemplar: its pixels, features, elements, lattice, colour layers and resized copies."""
 
-from importlib import import_module
 from types import ModuleType
 
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
@@ -24,7 +23,9 @@ def __getattr__(name: str) -> ModuleType:
     """Load the element finder on first use, because it loads SciPy."""
     if name != "element_finder":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_module("texrs.exemplar.element_finder")
+    import texrs.exemplar.element_finder as finder
+
+    return finder
 
 
 def __dir__() -> list[str]:
