@@ -250,7 +250,7 @@ def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
                 continue
             seen.add(id(thing))
             if inspect.isfunction(thing):
-                found[full] = thing, inspect.unwrap(thing)
+                found[full] = thing, thing.request.__init__ if hasattr(thing, "request") else inspect.unwrap(thing)
             elif inspect.isclass(thing):
                 if inspect.isfunction(thing.__init__) and not issubclass(thing, Enum):
                     found[full] = thing, thing.__init__
@@ -365,7 +365,7 @@ def record(name: str, place: Path) -> Call | None:
             break
     else:
         raise LookupError(f"{name}: no example calls it, nor one of EXAMPLES")
-    if inspect.isclass(thing):
+    if inspect.isclass(thing) or hasattr(thing, "request"):
         found.pop("self", None)
     elif "self" in found:
         thing = getattr(found.pop("self"), function.__name__)

@@ -15,7 +15,7 @@ LAYERS = (
     ("_calls", "_memory", "_notices"),
     ("limits",),
     ("_alpha", "_cache", "_checks", "_digits", "_progress", "_version"),
-    ("io",),
+    ("io", "_requests"),
     ("_conversion",),
     ("_masks",),
     ("_arrays",),

@@ -12,19 +12,58 @@ from texrs import _palettes
 from texrs._arrays import as_image
 from texrs._notices import Notices, collect, repeat
 from texrs._progress import listen
+from texrs._requests import Request, describe, make_signature
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.materials.material import Material, apply_materials, guide_materials
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["takes_materials"]
+__all__ = ["takes_materials", "verb"]
 
 if TYPE_CHECKING:
     from texrs.elements import ElementAnalysis
 
 P = ParamSpec("P")
+R = TypeVar("R", bound=Request)
 T = TypeVar("T")
+PARAMETERS = "    {parameters}\n"
+"""Line of a docstring that `verb` replaces by the descriptions of the parameters."""
+
+
+def verb(kind: Callable[P, R], *names: str, **options: Any) -> Callable[[Callable[[R], T]], Callable[P, T]]:
+    """Make a public verb from a function of a request.
+
+    Parameters
+    ----------
+    kind : class
+        Class of the request, whose fields are the parameters of the verb (`texrs._requests`).
+    *names : str
+        Names of the parameters that are exemplars, see `takes_materials`.
+    **options
+        Options of `takes_materials`.
+
+    Returns
+    -------
+    callable
+        Decorator. The verb has the signature of the request, and its descriptions of the parameters in place of the
+        line ``{parameters}`` of the docstring. It checks its arguments, and calls the function with the request.
+
+    """
+
+    def decorate(work: Callable[[R], T]) -> Callable[P, T]:
+        @wraps(work)
+        def run(*args: P.args, **kwargs: P.kwargs) -> T:
+            return work(kind(*args, **kwargs))
+
+        run.__signature__ = make_signature(kind, work.__annotations__["return"])  # type: ignore[attr-defined]
+        run.request = kind  # type: ignore[attr-defined]
+        # Python removes docstrings with the option -OO.
+        if run.__doc__ is not None:
+            run.__doc__ = run.__doc__.replace(PARAMETERS, "".join(f"    {line}\n" for line in describe(kind)))
+        return takes_materials(*names, **options)(run) if names else run
+
+    return decorate
 
 
 def takes_materials(

@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 import typer
 
 from texrs._masks import Mask
+from texrs._requests import find_types
 from texrs.cli._console import name_commands
 from texrs.cli._kinds import KINDS, Kind
 from texrs.cli._texts import About
@@ -181,7 +182,9 @@ class Options:
     def _find(self, only: Collection[str]) -> Iterator[tuple[Path, inspect.Parameter, str]]:
         """Yield each parameter, or each field of a dataclass, with its description."""
         texts = describe(self.function)
-        for name, each in inspect.signature(self.function, eval_str=True).parameters.items():
+        known = inspect.signature(self.function, eval_str=True).parameters
+        types_ = find_types(self.function.request) if hasattr(self.function, "request") else {}
+        for name, each in ((n, p.replace(annotation=types_.get(n, p.annotation))) for n, p in known.items()):
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
                 continue
             group: Any = next((t for t in _split_union(each.annotation) if is_dataclass(t)), self.groups.get(name))

@@ -85,14 +85,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from texrs._progress import listen
 from texrs._typing import Progress
-from texrs._verbs import takes_materials
-from texrs.blending import SCREENING
-from texrs.elements import ElementAnalysis
+from texrs._verbs import verb
 from texrs.errors import InvalidInput
-from texrs.exemplar import ElementOptions
-from texrs.papers.design.arguments import Arguments, Choice, Density, Exemplars, Method, Size, Weights, check_arguments
+from texrs.papers.design.arguments import Design, DesignRequest, DesignVariants
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
@@ -104,81 +100,13 @@ from texrs.tiling.check import check_result, report_tiling
 __all__ = ["DeformationOptions", "design", "design_variants"]
 
 
-@takes_materials("exemplar")
-def design(
-    exemplar: Exemplars,
-    size: Size = None,
-    *,
-    seed: int = 0,
-    wrap: bool | Sequence[bool] | None = None,
-    weights: Weights = None,
-    density: Density = None,
-    elements: ElementOptions | ElementAnalysis = ElementOptions(),
-    deformation: DeformationOptions = DeformationOptions(),
-    way: Choice = "auto",
-    copies: int = 4,
-    patch_size: int | None = None,
-    screening: float | None = SCREENING,
-    method: Method = None,
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(Design, "exemplar")
+def design(asked: Design) -> Synthesis:
     """Synthesise a large texture from one example by moving its elements and stitching patches.
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
-        dtype and number of channels. A `texrs.elements.ElementAnalysis`, as for `splice`, contains an image and its
-        elements.
-    size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 a side. Default: twice the size of the exemplar.
-    seed : int
-        Number that selects the texture, 0 to 2^64 - 1. The same exemplar, options, seed and version give the same
-        bytes. Default: 0.
-    wrap : bool or (rows, columns), optional
-        Axes along which the result repeats without a visible border. Default: both.
-    weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of the exemplars in the result: one number for each, 0 or more. Python also accepts a map of exemplar
-        numbers, or a map of shares for each pixel. The shares of the whole result are correct within 3 %. Borders
-        follow the outlines of elements, at most one element away from their position in a map. Default: equal shares.
-    density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the result that is covered by elements of each exemplar after the first, 0 to 1. Give one number for
-        all of these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
-        exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
-        contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
-        scattered.
-    elements : ElementOptions or ElementAnalysis
-        Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
-        used. Default: the default options.
-    deformation : DeformationOptions
-        Options that control how elements are deformed. Default: the default options.
-    way : {"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}
-        Way to lay the texture. "move" deforms elements, as in the paper. "still" leaves elements in place, and joins
-        patches of the exemplar and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes
-        "lattice" or "courses". Patches are then in step with the lattice, or the texture is built course by course.
-        "stitch" joins smaller patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a
-        new arrangement. "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways
-        that the exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it
-        is "move". Default: "auto".
-    copies : int
-        Number of deformed copies of the exemplar that the result is stitched from, 1 to 64. Default: 4.
-    patch_size : int, optional
-        Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
-        shorter side, but at least 12 and at most 32.
-    screening : float, optional
-        Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
-        weight spreads the correction farther from the seams. If None or 0, colours are not corrected. `texrs.blend`
-        corrects other maps in the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
-    method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison, with only its misprints repaired. It
-        moves whole colour layers, once each or ``operations`` times. It stitches them at the cost of the paper, fills
-        holes with the best match, and corrects colours without a weight on the original values. It ignores
-        ``segmentation`` in ``elements``, and ``translate``, ``rotate`` and ``allow_mirror`` in ``deformation``.
-        ``screening`` only switches its colour correction on, or off if 0. Default: the algorithm with departures from
-        the paper.
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
-        the work stops. True shows a progress bar. Default: none.
+    {parameters}
 
     Returns
     -------
@@ -271,46 +199,11 @@ def design(
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, allow_mirror=False))
 
     """
-    progress = listen(progress)
-    variants = design_variants(
-        exemplar,
-        1,
-        size,
-        seed=seed,
-        wrap=wrap,
-        weights=weights,
-        density=density,
-        elements=elements,
-        deformation=deformation,
-        way=way,
-        copies=copies,
-        patch_size=patch_size,
-        screening=screening,
-        method=method,
-        progress=progress,
-    )
-    return next(variants)
+    return next(make_textures(asked))
 
 
-@takes_materials("exemplar")
-def design_variants(
-    exemplar: Exemplars,
-    count: int,
-    size: Size = None,
-    *,
-    seed: int = 0,
-    wrap: bool | Sequence[bool] | None = None,
-    weights: Weights = None,
-    density: Density = None,
-    elements: ElementOptions | ElementAnalysis = ElementOptions(),
-    deformation: DeformationOptions = DeformationOptions(),
-    way: Choice = "auto",
-    copies: int = 4,
-    patch_size: int | None = None,
-    screening: float | None = SCREENING,
-    method: Method = None,
-    progress: Progress | bool | None = None,
-) -> Iterator[Synthesis]:
+@verb(DesignVariants, "exemplar")
+def design_variants(asked: DesignVariants) -> Iterator[Synthesis]:
     """Synthesise several different textures from one example, which is analysed only once.
 
     The arguments are checked when the function is called. Each texture is computed when the iterator reaches it, so
@@ -318,60 +211,7 @@ def design_variants(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them
-        Example image, of any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same
-        dtype and number of channels. A `texrs.elements.ElementAnalysis`, as for `splice`, contains an image and its
-        elements.
-    count : int
-        Number of textures, 1 to 4096.
-    size : int or (rows, columns), optional
-        Size of each texture, in pixels, at least 16 a side. Default: twice the size of the exemplar.
-    seed : int
-        Number that selects the textures, 0 to 2^64 - 1. Their seeds are ``seed``, ``seed + 1``, ... Default: 0.
-    wrap : bool or (rows, columns), optional
-        Axes along which each texture repeats without a visible border. Default: both.
-    weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of the exemplars in the result: one number for each, 0 or more. Python also accepts a map of exemplar
-        numbers, or a map of shares for each pixel. The shares of the whole result are correct within 3 %. Borders
-        follow the outlines of elements, at most one element away from their position in a map. Default: equal shares.
-    density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
-        Share of the result that is covered by elements of each exemplar after the first, 0 to 1. Give one number for
-        all of these exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first
-        exemplar. Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
-        contains the requested and the reached densities, and the densities in the exemplars. Default: elements are not
-        scattered.
-    elements : ElementOptions or ElementAnalysis
-        Options that control how elements are found, or the result of `texrs.elements.analyse`, whose ``labels`` are
-        used. Default: the default options.
-    deformation : DeformationOptions
-        Options that control how elements are deformed. Default: the default options.
-    way : {"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}
-        Way to lay the texture. "move" deforms elements, as in the paper. "still" leaves elements in place, and joins
-        patches of the exemplar and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes
-        "lattice" or "courses". Patches are then in step with the lattice, or the texture is built course by course.
-        "stitch" joins smaller patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a
-        new arrangement. "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways
-        that the exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it
-        is "move". Default: "auto".
-    copies : int
-        Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
-    patch_size : int, optional
-        Side of the patches that fill holes, in pixels, from 4 to the exemplar's shorter side. Default: 1/6 of the
-        shorter side, but at least 12 and at most 32.
-    screening : float, optional
-        Weight of the original values when colours are corrected to hide seams, 0 to 1e6 (section 3.6). A smaller
-        weight spreads the correction farther from the seams. If None or 0, colours are not corrected. `texrs.blend`
-        corrects other maps in the same way, with ``across=False`` if there are several exemplars. Default: 0.15.
-    method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison, with only its misprints repaired. It
-        moves whole colour layers, once each or ``operations`` times. It stitches them at the cost of the paper, fills
-        holes with the best match, and corrects colours without a weight on the original values. It ignores
-        ``segmentation`` in ``elements``, and ``translate``, ``rotate`` and ``allow_mirror`` in ``deformation``.
-        ``screening`` only switches its colour correction on, or off if 0. Default: the algorithm with the departures
-        of `design`.
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
-        the work stops. True shows a progress bar. Default: none.
+    {parameters}
 
     Returns
     -------
@@ -394,28 +234,10 @@ def design_variants(
     True
 
     """
-    progress = listen(progress)
-    arguments = check_arguments(
-        exemplar,
-        count,
-        size,
-        seed=seed,
-        wrap=wrap,
-        weights=weights,
-        density=density,
-        elements=elements,
-        deformation=deformation,
-        way=way,
-        copies=copies,
-        patch_size=patch_size,
-        screening=screening,
-        method=method,
-        progress=progress,
-    )
-    return make_textures(arguments)
+    return make_textures(asked)
 
 
-def make_textures(arguments: Arguments) -> Iterator[Synthesis]:
+def make_textures(arguments: DesignRequest) -> Iterator[Synthesis]:
     """Segment the exemplars, and synthesise a texture for each seed."""
     plans = segment(arguments)
     for number, seed in enumerate(arguments.seeds, start=1):
@@ -425,11 +247,11 @@ def make_textures(arguments: Arguments) -> Iterator[Synthesis]:
         yield made
 
 
-def segment(arguments: Arguments) -> list[Plan]:
+def segment(arguments: DesignRequest) -> list[Plan]:
     """Segment each exemplar, and decide how its elements can move (step 1)."""
     plans: list[Plan] = []
     # The printed algorithm moves whole layers, so elements are not segmented.
-    elements = replace(arguments.elements, segmentation="none") if arguments.literal else arguments.elements
+    elements = replace(arguments.search, segmentation="none") if arguments.literal else arguments.search
     arguments.watch("segment", 0.0)
     for number, exemplar in enumerate(arguments.guides):
         progress = partial(report_share, arguments.watch, number, len(arguments.guides))
@@ -442,7 +264,7 @@ def segment(arguments: Arguments) -> list[Plan]:
     return plans
 
 
-def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synthesis:
+def make_texture(plans: Sequence[Plan], arguments: DesignRequest, seed: int) -> Synthesis:
     """Synthesise one texture from analysed exemplars (steps 2 to 6)."""
     try:
         tiles, composite = make_composite(plans, arguments, seed)

@@ -1,28 +1,32 @@
-"""Arguments of `texrs.design`, checked before any work begins."""
+"""Parameters of `texrs.design` and `texrs.design_variants`, checked before any work begins."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import (
-    as_choice,
-    as_float,
-    as_int,
-    as_list,
-    as_method,
-    as_seed,
-    as_size,
-    as_wrap,
-    check_work,
-    to_unit,
-    try_array,
+from texrs._arrays import as_int, as_list, as_size, check_work, to_unit, try_array
+from texrs._requests import (
+    PROGRESS,
+    SEED,
+    Request,
+    Word,
+    as_given,
+    as_weight,
+    choice,
+    instance,
+    method,
+    periodic,
+    request,
+    tied,
+    whole,
 )
 from texrs._typing import Array, Progress
+from texrs.blending import SCREENING
 from texrs.elements import ElementAnalysis
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
@@ -30,7 +34,7 @@ from texrs.materials import Material
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Way
 
-__all__ = ["Arguments", "Choice", "Density", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
+__all__ = ["Design", "DesignRequest", "DesignVariants"]
 
 Exemplars: TypeAlias = (
     Array | Exemplar | ElementAnalysis | Material | Sequence[Array | Exemplar | ElementAnalysis | Material]
@@ -47,30 +51,132 @@ LARGER = "texrs.CornerTiles creates an unbounded design in parts"
 """Remedy in error messages about a size that exceeds a limit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Arguments:
-    """Checked arguments of `texrs.design`."""
+@request
+class DesignRequest(Request):
+    """Parameters of `texrs.design` and `texrs.design_variants`.
 
-    exemplars: list[Exemplar]
-    guides: list[Exemplar]
-    """The same exemplars on one common scale of values, which is used for all decisions of the algorithm."""
-    size: tuple[int, int]
-    seeds: list[int]
-    wrap: tuple[bool, bool]
-    shares: NDArray[np.float64]
-    """Share of each exemplar: (n,) for the whole texture, or (rows, columns, n)."""
-    density: NDArray[np.float64] | None
-    """Share of the area that elements of each exemplar after the first cover: (n - 1,), or (rows, columns, n - 1)."""
-    elements: ElementOptions
-    deformation: DeformationOptions
-    way: Choice
-    copies: int
-    side: int | None
-    """Side of the patches that fill holes, in pixels, or None for the default."""
-    screening: float
-    literal: bool
-    """If True, the paper is followed as printed."""
-    watch: Progress
+    - ``exemplar`` ((H, W) or (H, W, C) array, Exemplar, ElementAnalysis, or a sequence of them): Example image, of
+      any real dtype, at least 16 pixels a side. Several exemplars are mixed if they have the same dtype and number
+      of channels. A `texrs.elements.ElementAnalysis`, as for `splice`, contains an image and its elements.
+    - ``seed`` (int): Number that selects the texture, 0 to 2^64 - 1. The same exemplar, options, seed and version
+      give the same bytes. Default: 0.
+    - ``wrap`` (bool or (rows, columns), optional): Axes along which the result repeats without a visible border.
+      Default: both.
+    - ``weights`` ((n,), (rows, columns) of int, or (rows, columns, n) array, optional): Shares of the exemplars in
+      the result: one number for each, 0 or more. Python also accepts a map of exemplar numbers, or a map of shares
+      for each pixel. The shares of the whole result are correct within 3 %. Borders follow the outlines of
+      elements, at most one element away from their position in a map. Default: equal shares.
+    - ``density`` (float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional): Share of the
+      result that is covered by elements of each exemplar after the first, 0 to 1. Give one number for all of these
+      exemplars, one number for each, or maps. Whole elements are scattered over a texture of the first exemplar.
+      Elements of the last exemplar are on top. Cannot be combined with ``weights``. The report's "density"
+      contains the requested and the reached densities, and the densities in the exemplars. Default: elements are
+      not scattered.
+    - ``elements`` (ElementOptions or ElementAnalysis): Options that control how elements are found, or the result
+      of `texrs.elements.analyse`, whose ``labels`` are used. Default: the default options.
+    - ``deformation`` (DeformationOptions): Options that control how elements are deformed. Default: the default
+      options.
+    - ``way`` ({"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}): Way to lay the texture.
+      "move" deforms elements, as in the paper. "still" leaves elements in place, and joins patches of the exemplar
+      and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes "lattice" or "courses".
+      Patches are then in step with the lattice, or the texture is built course by course. "stitch" joins smaller
+      patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a new arrangement.
+      "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways that the
+      exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it is
+      "move". Default: "auto".
+    - ``copies`` (int): Number of deformed copies of the exemplar that the result is stitched from, 1 to 64.
+      Default: 4.
+    - ``patch_size`` (int, optional): Side of the patches that fill holes, in pixels, from 4 to the exemplar's
+      shorter side. Default: 1/6 of the shorter side, but at least 12 and at most 32.
+    - ``screening`` (float, optional): Weight of the original values when colours are corrected to hide seams, 0 to
+      1e6 (section 3.6). A smaller weight spreads the correction farther from the seams. If None or 0, colours are
+      not corrected. `texrs.blend` corrects other maps in the same way, with ``across=False`` if there are several
+      exemplars. Default: 0.15.
+    - ``method`` ({None, "paper"}): Algorithm to use. "paper" is the algorithm as printed, for comparison, with
+      only its misprints repaired. It moves whole colour layers, once each or ``operations`` times. It stitches
+      them at the cost of the paper, fills holes with the best match, and corrects colours without a weight on the
+      original values. It ignores ``segmentation`` in ``elements``, and ``translate``, ``rotate`` and
+      ``allow_mirror`` in ``deformation``. ``screening`` only switches its colour correction on, or off if 0.
+      Default: the algorithm with departures from the paper.
+    """
+
+    exemplar: Word[Exemplars, list[Any]] = Word(lambda value, name: as_list(value))
+    _: KW_ONLY
+    seed: Word[int, int] = SEED
+    wrap: Word[bool | Sequence[bool] | None, tuple[bool, bool]] = Word(periodic(True), default=None)
+    weights: Word[Weights, Weights] = Word(as_given, default=None)
+    density: Word[Density, Density] = Word(as_given, default=None)
+    elements: Word[ElementOptions | ElementAnalysis, Any] = Word(as_given, default=ElementOptions())
+    deformation: Word[DeformationOptions, DeformationOptions] = Word(
+        instance(DeformationOptions), default=DeformationOptions()
+    )
+    way: Word[Choice, Choice] = Word(choice("auto", *get_args(Way)), default="auto")
+    copies: Word[int, int] = Word(whole(1, 64), default=4)
+    patch_size: Word[int | None, int | None] = Word(as_given, default=None)
+    screening: Word[float | None, float] = Word(as_weight, default=SCREENING)
+    method: Word[Method, Method] = Word(method(None, "paper"), default=None)
+    progress: Word[Progress | bool | None, Progress | None] = PROGRESS
+
+    @tied
+    def exemplars(self) -> list[Exemplar]:
+        """Exemplars that can be mixed."""
+        images = [e.image if isinstance(e, ElementAnalysis) else e for e in self.exemplar]
+        return [as_exemplar(image, minimum=MINIMUM_SIDE) for image in images]
+
+    @tied
+    def search(self) -> ElementOptions:
+        """Options that control how elements are found, with the labels of given elements."""
+        search = instance(ElementOptions)(take_entries(self.exemplar, self.exemplars, self.elements), "elements")
+        check_together(self.exemplars, search.labels)
+        return search
+
+    @tied
+    def extent(self) -> tuple[int, int]:
+        """Size of each texture in pixels. Both subclasses have a size."""
+        size = vars(self)["size"]
+        sides = size if size is not None else [2 * n for n in self.exemplars[0].shape]
+        rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
+        return rows, columns
+
+    @tied
+    def shares(self) -> NDArray[np.float64]:
+        """Share of each exemplar: (n,) for the whole texture, or (rows, columns, n)."""
+        return as_shares(self.weights, len(self.exemplars), self.extent)
+
+    @tied
+    def covered(self) -> NDArray[np.float64] | None:
+        """Share of the area that elements of each exemplar after the first cover: (n - 1,), or (rows, columns, n - 1)."""
+        if self.density is None:
+            return None
+        if self.weights is not None or self.method is not None:
+            other = "weights" if self.weights is not None else "method"
+            raise InvalidInput(
+                f"density: cannot be combined with {other}, because density scatters elements over the first exemplar"
+            )
+        return as_density(self.density, len(self.exemplars), self.extent)
+
+    @tied
+    def side(self) -> int | None:
+        """Side of the patches that fill holes, in pixels, or None for the default."""
+        most = min(min(e.shape) for e in self.exemplars)
+        return None if self.patch_size is None else as_int(self.patch_size, "patch_size", 4, most)
+
+    @tied
+    def guides(self) -> list[Exemplar]:
+        """Exemplars on one common scale of values, which is used for all decisions of the algorithm."""
+        # Check that the required memory is available before the work begins.
+        check_work("design", [e.pixels for e in self.exemplars], self.extent, way=LARGER, method=self.method)
+        return scale_together(self.exemplars)
+
+    @property
+    def seeds(self) -> list[int]:
+        """Seed of each texture."""
+        return [(self.seed + k) % 2**64 for k in range(vars(self).get("count", 1))]
+
+    @property
+    def literal(self) -> bool:
+        """If True, the paper is followed as printed."""
+        return self.method == "paper"
 
     @property
     def shapes(self) -> tuple[tuple[int, ...], ...]:
@@ -83,64 +189,31 @@ class Arguments:
         return [e.image for e in self.exemplars]
 
 
-def check_arguments(
-    exemplar: Exemplars,
-    count: int,
-    size: Size,
-    *,
-    seed: int,
-    wrap: bool | Sequence[bool] | None,
-    weights: Weights,
-    density: Density,
-    elements: ElementOptions | ElementAnalysis,
-    deformation: DeformationOptions,
-    way: Choice,
-    copies: int,
-    patch_size: int | None,
-    screening: float | None,
-    method: Method,
-    progress: Progress | None,
-) -> Arguments:
-    """Check the arguments of `texrs.design_variants`."""
-    given = as_list(exemplar)
-    exemplars = [as_exemplar(e.image if isinstance(e, ElementAnalysis) else e, minimum=MINIMUM_SIDE) for e in given]
-    chosen = take_entries(given, exemplars, elements)
-    for name, value, kind in (("elements", chosen, ElementOptions), ("deformation", deformation, DeformationOptions)):
-        if not isinstance(value, kind):
-            raise InvalidInput(f"{name}: must be {kind.__name__}(...), got {value!r}")
-    check_together(exemplars, chosen.labels)
-    sides = size if size is not None else [2 * n for n in exemplars[0].shape]
-    rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
-    first, cyclic = as_seed(seed), as_wrap(wrap, usual=True)
-    # Check the shares after the size, because a map of shares must have the size of the result.
-    shares = as_shares(weights, len(exemplars), (rows, columns))
-    as_method(method, None, "paper")
-    if density is not None and (weights is not None or method is not None):
-        other = "weights" if weights is not None else "method"
-        raise InvalidInput(
-            f"density: cannot be combined with {other}, because density scatters elements over the first exemplar"
-        )
-    as_choice(way, "way", ("auto", *get_args(Way)))
-    arguments = Arguments(
-        exemplars,
-        scale_together(exemplars),
-        (rows, columns),
-        [(first + k) % 2**64 for k in range(as_int(count, "count", 1, 4096))],
-        (cyclic[0], cyclic[1]),
-        shares,
-        None if density is None else as_density(density, len(exemplars), (rows, columns)),
-        chosen,
-        deformation,
-        way,
-        as_int(copies, "copies", 1, 64),
-        None if patch_size is None else as_int(patch_size, "patch_size", 4, min(min(e.shape) for e in exemplars)),
-        as_float(0.0 if screening is None else screening, "screening", 0, 1e6),
-        method == "paper",
-        progress or (lambda stage, share: None),
-    )
-    # Check that the required memory is available before the work begins.
-    check_work("design", [e.pixels for e in exemplars], (rows, columns), way=LARGER, method=method)
-    return arguments
+@request
+class Design(DesignRequest):
+    """Parameters of `texrs.design`.
+
+    - ``size`` (int or (rows, columns), optional): Size of the result, in pixels, at least 16 a side. Default:
+      twice the size of the exemplar.
+    """
+
+    size: Word[Size, Size] = Word(as_given, default=None)
+
+
+@request
+class DesignVariants(DesignRequest):
+    """Parameters of `texrs.design_variants`.
+
+    - ``count`` (int): Number of textures, 1 to 4096.
+    - ``seed`` (int): Number that selects the textures, 0 to 2^64 - 1. Their seeds are ``seed``, ``seed + 1``, ...
+      Default: 0.
+    - ``copies`` (int): Number of deformed copies of the exemplar that each texture is stitched from, 1 to 64. Default: 4.
+    - ``size`` (int or (rows, columns), optional): Size of each texture, in pixels, at least 16 a side. Default: twice
+      the size of the exemplar.
+    """
+
+    count: Word[int, int] = Word(whole(1, 4096))
+    size: Word[Size, Size] = Word(as_given, default=None)
 
 
 def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], elements: Any) -> Any:

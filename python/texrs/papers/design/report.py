@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_rgb
 from texrs._typing import Array
-from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import classify
 from texrs.papers.design.plan import Plan, Way
@@ -48,7 +48,7 @@ def describe(
     tiles: Sequence[Tile],
     composite: SourceMap,
     seams: dict[str, Any],
-    arguments: Arguments,
+    arguments: DesignRequest,
     seed: int,
 ) -> dict[str, Any]:
     """Return the report of a texture, with JSON types only."""
@@ -56,7 +56,7 @@ def describe(
     return {
         "method": "paper" if arguments.literal else "default",
         "seed": seed,
-        "size": list(arguments.size),
+        "size": list(arguments.extent),
         "wrap": list(arguments.wrap),
         "elements": sum(p.parts.count for p in plans),
         "segmentation": first.parts.kind,
@@ -69,7 +69,7 @@ def describe(
         "lattice_stretch": [describe_closing(p, arguments) for p in plans],
         "rotate": first.moves.rotate,
         "pixel_counts": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
-        "density": None if arguments.density is None else describe_density(plans, composite, arguments.density),
+        "density": None if arguments.covered is None else describe_density(plans, composite, arguments.covered),
         "holes": [t.holes for t in tiles],
         "screening": arguments.screening,
         "seams": seams,
@@ -77,17 +77,17 @@ def describe(
     }
 
 
-def describe_obstacles(plan: Plan, arguments: Arguments) -> dict[str, str]:
+def describe_obstacles(plan: Plan, arguments: DesignRequest) -> dict[str, str]:
     """Return the reason for each way that an exemplar or the size of the texture does not allow."""
-    reasons = {way: find_obstacle(plan, way, arguments.size, arguments.wrap) for way in get_args(Way)}
+    reasons = {way: find_obstacle(plan, way, arguments.extent, arguments.wrap) for way in get_args(Way)}
     return {way: reason for way, reason in reasons.items() if reason}
 
 
-def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | None:
+def describe_closing(plan: Plan, arguments: DesignRequest) -> list[list[float]] | None:
     """Return the (2, 2) matrix that stretches an exemplar's lattice to fit a periodic texture, or None."""
     closing = None
     if plan.parts.lattice is not None and any(arguments.wrap):
-        closing = plan.parts.lattice.close(arguments.size, arguments.wrap)
+        closing = plan.parts.lattice.close(arguments.extent, arguments.wrap)
     return None if closing is None else [[round(float(x), 4) for x in row] for row in closing]
 
 

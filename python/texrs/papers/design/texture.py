@@ -11,7 +11,7 @@ import numpy as np
 from texrs._typing import Array
 from texrs.blending import apply, measure_visibility
 from texrs.kernels.gather import gather
-from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.mixing import Layer, mix
 from texrs.papers.design.plan import Plan
@@ -28,11 +28,11 @@ The size is a share of the shorter side of the exemplars.
 """
 
 
-def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
+def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: DesignRequest, seed: int) -> SourceMap:
     """Stitch patches of the tiles into a texture of any size, on the torus if it wraps (section 3.1, step 4)."""
-    if arguments.density is not None:
+    if arguments.covered is not None:
         ground = lay(0, plans[:1], tiles, arguments, seed)
-        return scatter(ground, plans, arguments.density, wrap=arguments.wrap, seed=seed)
+        return scatter(ground, plans, arguments.covered, wrap=arguments.wrap, seed=seed)
     each = [
         lay(number, plans, [t for t in tiles if int(t.source.exemplar[0, 0]) == number], arguments, seed)
         for number in range(len(plans))
@@ -43,9 +43,9 @@ def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Argume
     return mix(
         [measure_layer(source, plan) for source, plan in zip(each, plans, strict=True)],
         arguments.shares,
-        extent=min(max(LEAST, float(np.mean([measure_extent(plan) for plan in plans]))), min(arguments.size) / 4),
+        extent=min(max(LEAST, float(np.mean([measure_extent(plan) for plan in plans]))), min(arguments.extent) / 4),
         # With a map of shares, halve the territories, because smaller territories follow the map more closely.
-        territory=min(TERRITORY * side / (2 if arguments.shares.ndim > 1 else 1), min(arguments.size) / 2),
+        territory=min(TERRITORY * side / (2 if arguments.shares.ndim > 1 else 1), min(arguments.extent) / 2),
         wrap=arguments.wrap,
         seed=seed,
     )
@@ -70,7 +70,7 @@ def measure_extent(plan: Plan) -> float:
     return float(np.sqrt(np.median(areas[areas > 0])))
 
 
-def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
+def say_finish(composite: SourceMap, arguments: DesignRequest) -> SourceMap:
     """Return a texture's source map with the colour correction that hides its seams (section 3.6)."""
     wrap, literal = arguments.wrap, arguments.literal
     if arguments.exemplars[0].labels:
@@ -82,13 +82,13 @@ def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
     return composite.with_finish(wrap, screening=arguments.screening, across=False)
 
 
-def look_up(composite: SourceMap, arguments: Arguments) -> Array:
+def look_up(composite: SourceMap, arguments: DesignRequest) -> Array:
     """Return the image of a texture before its colours are corrected. Labels are not interpolated."""
     labels = arguments.exemplars[0].labels
     return composite.render(arguments.images, interpolation="nearest" if labels else "cubic")
 
 
-def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) -> tuple[Array, dict[str, Any]]:
+def correct_colours(composite: SourceMap, picture: Array, arguments: DesignRequest) -> tuple[Array, dict[str, Any]]:
     """Correct the colours of an image as its source map specifies, and measure the seams before and after."""
     images, wrap = arguments.images, arguments.wrap
     before = after = measure_visibility(composite, images, picture, wrap=wrap)

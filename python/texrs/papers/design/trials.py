@@ -18,7 +18,7 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.exemplar.segmentation import shrink
-from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
@@ -54,7 +54,7 @@ TRIAL = 0
 """Seed of all trials. Their copies are used again by the texture with this seed."""
 
 
-def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
+def make_composite(plans: Sequence[Plan], arguments: DesignRequest, seed: int) -> tuple[list[Tile], SourceMap]:
     """Deform elements, fill holes, stitch the tiles, and set the colour correction (steps 2 to 5)."""
     tiles = []
     count = arguments.copies * len(plans)
@@ -72,7 +72,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
     return tiles, say_finish(stitch_tiles(plans, tiles, arguments, seed), arguments)
 
 
-def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:
+def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: DesignRequest) -> Plan:
     """Choose how an exemplar is rearranged: as requested, or as in the best trial.
 
     Parameters
@@ -83,7 +83,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         The example, on the common scale of values that decisions are based on.
     elements : ElementOptions
         Options with which the elements were found.
-    arguments : Arguments
+    arguments : DesignRequest
         Arguments of the request. The seed is not used, and the size only decides whether a lattice closes. Otherwise
         all textures of an exemplar are treated the same way.
 
@@ -93,13 +93,13 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     if arguments.way != "auto":
         way = arguments.way
         if way == "still":
-            closes = not find_obstacle(plan, "lattice", arguments.size, arguments.wrap)
+            closes = not find_obstacle(plan, "lattice", arguments.extent, arguments.wrap)
             way = "courses" if plan.parts.courses else "lattice" if closes else way
-        obstacle = find_obstacle(plan, way, arguments.size, arguments.wrap)
+        obstacle = find_obstacle(plan, way, arguments.extent, arguments.wrap)
         if obstacle:
             raise InvalidInput(f'way: must be another way than "{way}", because {obstacle}')
         return replace(plan, way=way)
-    ways = list_ways(plan, arguments.size, arguments.wrap)
+    ways = list_ways(plan, arguments.extent, arguments.wrap)
     if arguments.deformation != DeformationOptions():
         return plan
     if len(ways) == 1:
@@ -130,7 +130,7 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
     return replace(plan, way=best, tried=tried, trials=trials, tiles=made.get(best, ()))
 
 
-def reduce(exemplar: Exemplar, plan: Plan, arguments: Arguments, times: int) -> tuple[Exemplar, Plan]:
+def reduce(exemplar: Exemplar, plan: Plan, arguments: DesignRequest, times: int) -> tuple[Exemplar, Plan]:
     """Return an exemplar whose pixels are means of square blocks, and its plan."""
     rows, columns = (n // times for n in exemplar.shape)
     colours = exemplar.guidance[: rows * times, : columns * times].reshape(rows, times, columns, times, -1)
@@ -151,7 +151,7 @@ def choose_other(plan: Plan) -> Plan:
 
 
 def try_way(
-    plan: Plan, exemplar: Exemplar, arguments: Arguments, done: float
+    plan: Plan, exemplar: Exemplar, arguments: DesignRequest, done: float
 ) -> tuple[list[Tile], SourceMap, Array] | None:
     """Synthesise a small texture in one way, and return its tiles, source map and image.
 
@@ -164,17 +164,17 @@ def try_way(
     lattice, size = plan.parts.lattice, (SIDE, SIDE)
     if lattice is not None and lattice.close(size, (True, True)) is None:
         size = lattice.find_size(size, (True, True)) or size
-    small = replace(
-        arguments,
+    small = arguments.vary(
         side=plan.side,
         exemplars=[exemplar],
         guides=[exemplar],
-        size=size,
+        extent=size,
         wrap=(True, True),
         shares=np.ones(1),
         density=None,
+        covered=None,
         copies=min(TILES, arguments.copies),
-        watch=lambda stage, share: arguments.watch("try", done),
+        progress=lambda stage, share: arguments.watch("try", done),
     )
     try:
         tiles, composite = make_composite([plan], small, TRIAL)

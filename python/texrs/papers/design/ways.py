@@ -25,7 +25,7 @@ from texrs.exemplar.symmetry import flip_frame
 from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
 from texrs.mosaic import rearrange_cells
-from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.course_sheets import lay_sheets, measure_stones
 from texrs.papers.design.deformation import classify
@@ -87,7 +87,7 @@ def find_obstacle(plan: Plan, way: Way, size: tuple[int, int], wrap: tuple[bool,
     return ""
 
 
-def lay(number: int, plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
+def lay(number: int, plans: Sequence[Plan], tiles: Sequence[Tile], arguments: DesignRequest, seed: int) -> SourceMap:
     """Lay a texture from one of the exemplars, in the way of its plan."""
     plan, watch = plans[number], partial(report_share, arguments.watch, number, len(plans))
     if plan.way == "stitch":
@@ -109,7 +109,7 @@ def lay(number: int, plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Ar
 def quilt_tiles(
     pictures: list[Picture],
     plan: Plan,
-    arguments: Arguments,
+    arguments: DesignRequest,
     seed: int,
     watch: Callable[[float], object],
     *,
@@ -119,7 +119,7 @@ def quilt_tiles(
     side = min(plan.guide.shape[:2])
     return quilt(
         pictures,
-        arguments.size,
+        arguments.extent,
         patch=round(PATCH * side),
         overlap=round(OVERLAP * side),
         wrap=arguments.wrap,
@@ -129,28 +129,28 @@ def quilt_tiles(
     )
 
 
-def stitch_patches(number: int, arguments: Arguments, seed: int, watch: Callable[[float], object]) -> SourceMap:
+def stitch_patches(number: int, arguments: DesignRequest, seed: int, watch: Callable[[float], object]) -> SourceMap:
     """Stitch patches of one exemplar, each from the place where it fits best. The patches are not mirrored."""
     coordinates, patches = stitch_image(
-        arguments.guides[number], arguments.size, arguments.wrap, seed, lambda stage, share: watch(share)
+        arguments.guides[number], arguments.extent, arguments.wrap, seed, lambda stage, share: watch(share)
     )
     exemplars = np.full(patches.shape, number, np.uint16)
     frames = np.broadcast_to(np.eye(2, dtype=np.float32), (int(patches.max()) + 1, 2, 2)).copy()
     return SourceMap(coordinates, exemplars, patches, frames, arguments.shapes)
 
 
-def lay_new_cells(number: int, plan: Plan, arguments: Arguments, seed: int) -> SourceMap:
+def lay_new_cells(number: int, plan: Plan, arguments: DesignRequest, seed: int) -> SourceMap:
     """Lay bent cells of an exemplar in a new arrangement of its cells. The result is always periodic."""
     turns = (True, True) in plan.mirrors
-    laid = rearrange_cells(plan.parts.elements, plan.guide, arguments.size, turns=turns, seed=seed)
-    exemplars = np.full(arguments.size, number, np.uint16)
+    laid = rearrange_cells(plan.parts.elements, plan.guide, arguments.extent, turns=turns, seed=seed)
+    exemplars = np.full(arguments.extent, number, np.uint16)
     return SourceMap(laid.places, exemplars, laid.label, laid.frames, arguments.shapes)
 
 
-def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:
+def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: DesignRequest) -> list[Picture]:
     """Return the tiles as sources of patches. A lattice is stretched so that whole periods fit a periodic texture."""
     depth, lattice = measure_depth(plan), plan.parts.lattice
-    closing = None if lattice is None else lattice.close(arguments.size, arguments.wrap)
+    closing = None if lattice is None else lattice.close(arguments.extent, arguments.wrap)
     if closing is None:
         return [draw_picture(tile, depth) for tile in tiles]
     pictures = []
@@ -172,7 +172,7 @@ def draw_picture(tile: Tile, depth: Floats) -> Picture:
     return Picture(tile.colours, tile.source, gather(depth, tile.source.coordinates, interpolation="nearest"))
 
 
-def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list[Picture]:
+def draw_sheets(plan: Plan, tile: Tile, arguments: DesignRequest, seed: int) -> list[Picture]:
     """Return sources of patches for an exemplar in courses: sheets of its courses, as tall as the texture."""
     courses = plan.parts.courses
     assert courses is not None
@@ -182,7 +182,7 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list
     sheets = lay_sheets(
         courses,
         level.shape,
-        arguments.size[axis],
+        arguments.extent[axis],
         min(level.shape),
         count=arguments.copies,
         wrap=arguments.wrap[axis],
