@@ -74,6 +74,8 @@ __all__ = [
     "try_array",
 ]
 
+AT_ONCE = 1 << 14
+"""Number of pixels that are converted at once. It has no influence on the result."""
 FEW = 4
 """Maximum number of channels of an image in the check of the channel order."""
 
@@ -301,7 +303,13 @@ def to_lab(unit: Floats) -> Floats:
     """
     from skimage.color import rgb2lab
 
-    return np.asarray(rgb2lab(as_rgb(unit).astype(np.float64)) / 100, np.float32)
+    rgb = as_rgb(unit)
+    lab = np.empty(rgb.shape, np.float32)
+    # Convert some rows at a time, because the conversion in double precision takes ten times the memory of the result.
+    step = max(1, 3 * AT_ONCE * len(rgb) // max(1, rgb.size))
+    for start in range(0, len(rgb), step):
+        lab[start : start + step] = rgb2lab(rgb[start : start + step].astype(np.float64)) / 100
+    return lab
 
 
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:

@@ -280,33 +280,38 @@ def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
 
 def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
     """Find the lattice of an image, by autocorrelation of its lightness or edges."""
-    from scipy.ndimage import gaussian_filter
-
     if min(guide.shape[:2]) < 4 * SHORTEST:
         return None
     light = crop_light(guide)
     if light.std() < 1e-4:
         return None
-    rows, columns = np.gradient(gaussian_filter(light, 1.0))
-    edges = hypot_single(rows, columns)
-    found = []
-    for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
-        ask()
-        level = level_light(picture)
-        reaches = [as_reach(level.shape, share) for share in (REACH, FAR_REACH if far else REACH)]
-        products = sum_products(level, reaches[1])
-        near = _fit_lattice(correlate(level, reaches[0], whole=True, products=products), level.shape, REGULAR, 0.0)
-        wide = None
-        if far:
-            wide = _fit_lattice(correlate(level, reaches[1], products=products), level.shape, FAR_REGULAR, CHANCE)
-        # Short vectors of a coarse lattice join similar parts of its cell.
-        better = wide is not None and (near is None or near.correlation < DOUBTED * wide.correlation)
-        found.append(wide if better else near)
-    first, second = found
+    first, second = _search(light, far), _search(measure_edges(light), far)
     # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
     if first is None or (second is not None and second.correlation > CLEARER * first.correlation):
         return second
     return first
+
+
+def _search(picture: Floats, far: bool) -> Lattice | None:
+    """Return the lattice of an image with one channel."""
+    ask()
+    level = level_light(picture)
+    reaches = [as_reach(level.shape, share) for share in (REACH, FAR_REACH if far else REACH)]
+    products = sum_products(level, reaches[1])
+    near = _fit_lattice(correlate(level, reaches[0], whole=True, products=products), level.shape, REGULAR, 0.0)
+    if not far:
+        return near
+    wide = _fit_lattice(correlate(level, reaches[1], products=products), level.shape, FAR_REGULAR, CHANCE)
+    # Short vectors of a coarse lattice join similar parts of its cell.
+    return wide if wide is not None and (near is None or near.correlation < DOUBTED * wide.correlation) else near
+
+
+def measure_edges(light: Floats) -> Floats:
+    """Return the strength of the edges of an image, up to its 95 % quantile."""
+    from scipy.ndimage import gaussian_filter
+
+    edges = hypot_single(*np.gradient(gaussian_filter(light, 1.0)))
+    return np.minimum(edges, np.quantile(edges, 0.95))
 
 
 def crop_light(guide: Floats) -> Floats:
@@ -339,54 +344,64 @@ def correlate(
     steadier for short shifts. The correlation is 0 if too small a part overlaps. ``products`` are those of
     `sum_products`, for this reach or a larger one, if they are known.
     """
-    overlap = measure_overlap(picture.shape, reach)
-    squares = picture.astype(np.float64) ** 2
     found = sum_products(picture, reach) if products is None else products
-    top, left = ((n - near) // 2 for n, near in zip(found.shape, overlap.shape, strict=True))
-    found = found[top : top + len(overlap), left : left + overlap.shape[1]]
+    middle = found.shape[1] // 2
+    found = found[: reach[0] + 1, middle - reach[1] : middle + reach[1] + 1]
+    rows, columns = np.arange(reach[0] + 1), np.arange(-reach[1], reach[1] + 1)
     if whole:
-        found = found / (overlap * squares.size) / max(float(squares.mean()), 1e-12)
+        scale = measure_overlap(picture.shape, rows, columns)
+        scale *= max(float(np.square(picture, dtype=np.float64).sum()), 1e-12 * picture.size)
     else:
-        # Sums over all rectangles that overlap the shifted image, from the sums above and to the left of each pixel.
-        sums = np.pad(squares.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-        low, high = zip(*(_find_overlap(n, r) for n, r in zip(picture.shape, reach, strict=True)), strict=True)
-        first = sums[np.ix_(*high)] - sums[np.ix_(low[0], high[1])] - sums[np.ix_(high[0], low[1])] + sums[np.ix_(*low)]
-        # The part that a shift moves onto another one is the other part of the opposite shift.
-        found = found / np.sqrt(np.maximum(first * first[::-1, ::-1], 1e-12))
-    return np.asarray(np.where(overlap < OVERLAP, 0, found), np.float32)
+        scale = _measure_deviations(picture, reach[0], columns)
+    half = np.divide(found, scale, out=scale).astype(np.float32)
+    half[measure_overlap(picture.shape, rows, columns) < OVERLAP] = 0
+    return np.concatenate([half[:0:-1, ::-1], half])
 
 
-def _find_overlap(count: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first pixel of the part of a line that overlaps each shifted copy, and the end of this part."""
-    shifts = np.arange(-reach, reach + 1)
-    return np.maximum(shifts, 0), np.minimum(shifts, 0) + count
+def _measure_deviations(picture: Floats, reach: int, columns: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the products of the deviations of both overlapping parts, for shifts down by up to a number of rows."""
+    # The sum over a rectangle is a combination of the sums from the first pixel to its corners.
+    sums = np.zeros((picture.shape[0] + 1, picture.shape[1] + 1))
+    np.square(picture, out=sums[1:, 1:], dtype=np.float64)
+    for axis in range(2):
+        np.cumsum(sums, axis, out=sums)
+    left, right = np.maximum(columns, 0), np.minimum(columns, 0) + picture.shape[1]
+    lower, upper = sums[-1] - sums[: reach + 1], sums[::-1][: reach + 1]
+    # The part that a shift moves onto another one is the other part of the opposite shift.
+    product: NDArray[np.float64] = lower[:, right]
+    other = upper[:, right[::-1]]
+    product -= lower[:, left]
+    other -= upper[:, left[::-1]]
+    product *= other
+    return np.sqrt(np.maximum(product, 1e-12, out=product), out=product)
 
 
 def sum_products(picture: Floats, reach: tuple[int, int]) -> NDArray[np.float64]:
     """Return the sums of the products of an image and its copies, shifted by up to a number of rows and columns.
 
-    The transforms are computed in strips of `STRIP` lines to save memory.
+    The result has (reach + 1, 2 reach + 1) values: shifts up have the sums of the opposite shifts. The transforms are
+    computed in strips of `STRIP` lines to save memory.
     """
     from scipy.fft import fft, ifft, irfft, next_fast_len, rfft
 
     size = [next_fast_len(n + r, real=True) for n, r in zip(picture.shape, reach, strict=True)]
-    rows, columns = (np.arange(-r, r + 1) for r in reach)
+    columns = np.arange(-reach[1], reach[1] + 1)
     # Use double precision, because single-precision transforms differ in their last bits between processors.
     across = rfft(picture.astype(np.float64), size[1])
-    spectrum = np.empty((len(rows), across.shape[1]), np.complex128)
+    spectrum = np.empty((reach[0] + 1, across.shape[1]), np.complex128)
     for start in range(0, across.shape[1], STRIP):
         strip = fft(across[:, start : start + STRIP], size[0], axis=0)
-        spectrum[:, start : start + STRIP] = ifft(strip.real**2 + strip.imag**2, axis=0)[rows]
+        spectrum[:, start : start + STRIP] = ifft(strip.real**2 + strip.imag**2, axis=0)[: len(spectrum)]
     del across
-    found = np.empty((len(rows), len(columns)))
-    for start in range(0, len(rows), STRIP):
+    found = np.empty((len(spectrum), len(columns)))
+    for start in range(0, len(spectrum), STRIP):
         found[start : start + STRIP] = irfft(spectrum[start : start + STRIP], size[1])[:, columns]
     return found
 
 
-def measure_overlap(shape: tuple[int, ...], reach: tuple[int, int]) -> NDArray[np.float64]:
-    """Return the shares of an image that overlap its shifted copies, up to a reach."""
-    down, across = (1 - np.abs(np.arange(-r, r + 1)) / n for r, n in zip(reach, shape, strict=True))
+def measure_overlap(shape: tuple[int, ...], rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the shares of an image that overlap its copies, shifted by numbers of rows and columns."""
+    down, across = (1 - np.abs(shifts) / n for shifts, n in zip((rows, columns), shape[:2], strict=True))
     return np.outer(down, across)
 
 
@@ -397,24 +412,23 @@ def _fit_lattice(correlation: Floats, shape: tuple[int, ...], least: float, chan
     ``chance`` standard deviations of the correlation of scattered elements.
     """
     reach = np.array(correlation.shape) // 2
-    overlap = measure_overlap(shape, (int(reach[0]), int(reach[1])))
     tolerant = widen(correlation, 2)
-    rows, columns = (np.arange(-r, r + 1) for r in reach)
-    far = np.add.outer(rows**2, columns**2) > SHORTEST**2
-    half = (rows[:, None] > 0) | ((rows[:, None] == 0) & (columns > 0))
-    peaks = np.argwhere((widen(correlation, 3) == correlation) & far & half)
-    value = correlation[tuple(peaks.T)]
-    order = np.lexsort((peaks[:, 1], peaks[:, 0], -value))[:PEAKS]
-    vectors = [v - reach for v in peaks[order]]
+    away = np.argwhere(widen(correlation, 3) == correlation) - reach
+    # Keep one shift of each two opposite ones.
+    half = (away[:, 0] > 0) | ((away[:, 0] == 0) & (away[:, 1] > 0))
+    away = away[half & ((away**2).sum(axis=1) > SHORTEST**2)]
+    value = correlation[tuple((away + reach).T)]
+    vectors = away[np.lexsort((away[:, 1], away[:, 0], -value))[:PEAKS]]
     found: dict[tuple[Vector, Vector], tuple[float, int]] = {}
     for i, one in enumerate(vectors):
         for other in vectors[i + 1 :]:
             a, b = _reduce(one, other)
             cell = abs(int(a[0] * b[1] - a[1] * b[0]))
-            if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
+            if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or a @ a < SHORTEST**2:
                 continue
-            mean, deviation = _average(tolerant, a, b, reach), _measure_chance(correlation, overlap, a, shape)
-            if mean > chance * deviation and all(_has_dip(correlation, v, reach) for v in (a, b)):
+            mean = _average(tolerant, a, b, reach)
+            least_mean = chance * _measure_chance(correlation, a, shape) if chance else 0.0
+            if mean > least_mean and all(_has_dip(correlation, v, reach) for v in (a, b)):
                 found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
     if not found:
         return None
@@ -485,17 +499,19 @@ def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reac
     return float(correlation[tuple(places.T)].mean()) if len(places) >= 4 else 0.0
 
 
-def _measure_chance(
-    correlation: Floats, overlap: NDArray[np.float64], a: NDArray[np.intp], shape: tuple[int, ...]
-) -> float:
+def _measure_chance(correlation: Floats, a: NDArray[np.intp], shape: tuple[int, ...]) -> float:
     """Return the standard deviation of the correlation of scattered elements (Bartlett's formula).
 
     The elements have the size of the peak at the zero shift, up to half of the shorter lattice vector.
     """
-    rows, columns = (np.arange(n) - n // 2 for n in correlation.shape)
+    middle = np.array(correlation.shape) // 2
+    reach = np.minimum(middle, int(np.hypot(*a) / 2))
+    rows, columns = (np.arange(-r, r + 1) for r in reach)
     inside = np.add.outer(rows**2, columns**2) <= float(a @ a) / 4
-    area = float((correlation[inside].astype(np.float64) ** 2).sum())
-    return float(np.sqrt(area / (shape[0] * shape[1] * overlap[inside].mean())))
+    (top, left), (bottom, right) = middle - reach, middle + reach + 1
+    area = float((correlation[top:bottom, left:right][inside].astype(np.float64) ** 2).sum())
+    overlap = measure_overlap(shape, rows, columns)[inside].mean()
+    return float(np.sqrt(area / (shape[0] * shape[1] * overlap)))
 
 
 def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:

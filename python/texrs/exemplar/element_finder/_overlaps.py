@@ -62,18 +62,14 @@ def find_overlaps(labels: Labels) -> tuple[Overlap, ...]:
     directions = np.stack([np.sin(angles), np.cos(angles)], 1)
     reach = (extremes * directions).sum(-1)
     boxes = ndimage.find_objects(labels)
-    places: dict[int, NDArray[np.float64]] = {}
     found = []
     for (a, b), (length, _, _) in zip(pairs.tolist(), arcs.tolist(), strict=True):
         smaller = min(area[a], area[b])
         # Elements that meet at a corner do not show an order.
         if a == 0 or smaller == 0 or length < 0.4 * np.sqrt(smaller):
             continue
-        for i in (a, b):
-            if i not in places:
-                places[i] = project(labels, boxes[i - 1], i, directions)
         # The number of pixels of each element inside the convex hull of the other one.
-        entered = [int((places[i] <= reach[j]).all(axis=1).sum()) for i, j in ((a, b), (b, a))]
+        entered = [count_inside(labels, i, boxes[j - 1], directions, reach[j]) for i, j in ((a, b), (b, a))]
         difference = (entered[0] - entered[1]) / smaller
         sure = 1 / (1 + np.exp(-abs(difference) / CLEAR))
         above, below = (a, b) if difference > 0 else (b, a)
@@ -81,9 +77,14 @@ def find_overlaps(labels: Labels) -> tuple[Overlap, ...]:
     return tuple(found)
 
 
-def project(
-    labels: Labels, box: tuple[slice, slice], number: int, directions: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return how far the pixels of an element are in each direction, shape (pixels, directions)."""
+def count_inside(
+    labels: Labels,
+    number: int,
+    box: tuple[slice, slice],
+    directions: NDArray[np.float64],
+    reach: NDArray[np.float64],
+) -> int:
+    """Return how many pixels of an element are in a box and not farther out in any direction than a reach."""
     y, x = np.nonzero(labels[box] == number)
-    return np.outer(y + box[0].start, directions[:, 0]) + np.outer(x + box[1].start, directions[:, 1])
+    away = np.outer(y + box[0].start, directions[:, 0]) + np.outer(x + box[1].start, directions[:, 1])
+    return int((away <= reach).all(axis=1).sum())
