@@ -16,6 +16,7 @@ import pytest
 
 from texrs import io, samples
 from texrs.cli import main
+from texrs.io.annotation import write_record
 
 Capture = pytest.CaptureFixture[str]
 RECIPE = """
@@ -59,7 +60,8 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     assert main(["batch", "all.toml"]) == 0
     names = [f"{n}-{p}-{s}" for n in ("dots", "weave") for p in ("still", "turned") for s in (3, 4)]
     made = set(files(here)) - set(before)
-    assert made == {f"made/{n}.png" for n in names} | {f"maps/{n}.npz" for n in names} | {"made/sheet.png"}
+    maps = {f"maps/{n}.npz{beside}" for n in names for beside in ("", ".json")}
+    assert made == {f"made/{n}.png" for n in names} | maps | {"made/sheet.png"}
     err = capsys.readouterr().err.splitlines()
     assert err[0] == "texrs: 1 of 8: wrote made/dots-still-3.png"
     assert err[-1].startswith("texrs: 8 of 8 results are complete, 0 failed, in ")
@@ -103,7 +105,7 @@ def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
     # Results that are missing, changed or made in another way are computed again.
     Path("maps/dots-still-3.npz").unlink()
     io.write("made/weave-still-3.png", np.zeros((48, 48, 3), np.uint8))
-    io.write_metadata("made/weave-still-3.png", io.Metadata(made=io.read_metadata("made/weave-turned-3.png").made))
+    write_record(Path("made/weave-still-3.png"), str(io.read_metadata("made/weave-turned-3.png").made))
     assert main(["batch", "all.toml", "--force"]) == 0
     err = capsys.readouterr().err.splitlines()
     assert [line for line in err if "wrote" in line] == [

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -324,12 +325,13 @@ def test_whatever_a_folder_does_not_give_is_reported(here: Path, capsys: pytest.
 
 
 def test_a_profile_that_a_folder_loses_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from PIL import ImageCms
+    from PIL import Image, ImageCms
 
+    albedo = io.read("rock/rock_albedo.png")
     lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     for profile, count in ((srgb, 0), (lab, 1), (b"damaged" * 40, 1)):
-        io.write_metadata("rock/rock_albedo.png", io.Metadata(profile=profile))
+        Image.fromarray(albedo).save("rock/rock_albedo.png", icc_profile=profile)
         assert main(["info", "rock"]) == 0
         assert capsys.readouterr().err.count("ICC profile") == count
 
@@ -347,7 +349,7 @@ def test_primaries_and_gamma_that_a_folder_loses_are_reported(here: Path, capsys
         (exr, io.Metadata(primaries=plain), ""),
     ):
         kept = file.read_bytes()
-        io.write_metadata(file, notes)
+        io.write(file, io.read(file), notes=replace(notes, multiplied=None))
         assert main(["info", "rock"]) == 0
         said = capsys.readouterr().err
         assert (f"{file}: {words}" in said) if words else (str(file) not in said)

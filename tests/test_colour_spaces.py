@@ -220,8 +220,7 @@ def test_layers_of_an_exr_file_are_light(dtype: str, depth: Any, tmp_path: Path)
 def test_a_linear_png_is_read_as_it_says(tmp_path: Path) -> None:
     """A gamma of 1 states that the integers are light."""
     whole = np.rint(TRUTH[..., :3] * 65535).astype(np.uint16)
-    io.write(tmp_path / "albedo.png", whole)
-    io.write_metadata(tmp_path / "albedo.png", io.Metadata(gamma=1.0))
+    io.write(tmp_path / "albedo.png", whole, notes=io.Metadata(gamma=1.0))
     material = Material.read(tmp_path)
     assert material["albedo"].space == "linear"
     material.save(tmp_path / "new", depth=32)

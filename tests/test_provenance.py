@@ -16,6 +16,7 @@ from PIL import Image, ImageCms
 import texrs
 from texrs import SourceMap, io, samples
 from texrs.cli import main
+from texrs.io.annotation import write_record
 from texrs.io.formats import FORMATS
 
 Capture = pytest.CaptureFixture[str]
@@ -115,7 +116,7 @@ def test_commands_replace_what_they_made(here: Path, capsys: Capture, name: str)
     if target.endswith(".png"):
         picture = io.read(target)
         io.write(target, picture[::-1].copy())
-        io.write_metadata(target, io.Metadata(made=json.dumps(said_before(first, here))))
+        write_record(Path(target), json.dumps(said_before(first, here)))
         changed = files(here)
         assert main(command) == 2
         assert "was changed since" in capsys.readouterr().err
@@ -182,8 +183,7 @@ def test_colours_and_density_go_through(here: Path) -> None:
     deep = (io.read("in.png").astype(np.uint16)) * 257
     known = io.Metadata(profile=PROFILE, density=(3000.0, 2000.0))
     for name, pixels in (("p.png", deep), ("p.tif", deep), ("p.jpg", io.read("in.png"))):
-        io.write(name, pixels)
-        io.write_metadata(name, known)
+        io.write(name, pixels, notes=known)
         for out in ("o.png", "o.tif", *(["o.jpg"] if pixels.dtype == np.uint8 else [])):
             assert main(["tile", name, "-o", out, "-q", "--force"]) == 0
             found = io.read_metadata(out)
@@ -192,7 +192,7 @@ def test_colours_and_density_go_through(here: Path) -> None:
             assert io.read(out).dtype == pixels.dtype
     assert main(["apply", "map.npz", "p.png", "-o", "applied.png", "-q"]) == 0
     assert io.read_metadata("applied.png").profile == PROFILE
-    io.write_metadata("in.png", io.Metadata(gamma=1.0))
+    io.write("in.png", io.read("in.png"), notes=io.Metadata(gamma=1.0))
     assert main(["tile", "in.png", "-o", "linear.png", "-q"]) == 0
     assert io.read_metadata("linear.png").gamma == 1.0
     # A rotated photograph is turned upright, and its orientation is removed.
@@ -358,7 +358,7 @@ def test_what_changed_is_named(here: Path, capsys: Capture) -> None:
     os.rename("kept.png", "hole.png")
     # This result was painted over, and still has its record.
     io.write("r.png", picture)
-    io.write_metadata("r.png", io.Metadata(made=json.dumps(said_before(whole, here))))
+    write_record(Path("r.png"), json.dumps(said_before(whole, here)))
     assert main(["info", "r.png"]) == 0
     assert "changed since it was made" in capsys.readouterr().out
     assert main(["rerun", "r.png", "-o", "former.png", "-q"]) == 0

@@ -309,9 +309,11 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
 def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
     """Return True if a folder contains enough maps, and the same command wrote them from the same inputs."""
     count = 0
-    for path in _provenance.list_folder(folder):
+    names = _provenance.list_folder(folder)
+    for path in names:
         made = io.read_metadata(path).made
-        if made is None:
+        # The record of another file is not a result.
+        if made is None or path.removesuffix(".json") in set(names) - {path}:
             continue
         said, wanted = json.loads(made), json.loads(record.tell(path, inside=True))
         if any(said.get(key) != value for key, value in wanted.items() if key != "content") or not is_unchanged(

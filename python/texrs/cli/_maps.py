@@ -80,17 +80,16 @@ def apply_command(
         for paths, target, made in zip(groups, targets, records, strict=True):
             images = [read(path) for path in paths]
             _outputs.check_output(target, images[0], places.shape)
-            channels = images[0].shape[places.axes] if images[0].ndim > places.axes else 1
-            like = replace(io.read_metadata(paths[0]).fit(channels), made=None)
-            temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
+            like = replace(io.read_metadata(paths[0]), georeference=())
+            temporary = stack.enter_context(_outputs.write_output(target, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
                 image = make_map(paths[0], images, places, values, fit(finish, paths, given))
             if places.axes == 2:
                 packed = find_packed(paths[0]) is not None
                 coloured = not packed and read_kind(paths[0], images, places, values)[0] == "colour"
-                io.write(temporary, image, notes=io.Metadata(multiplied=like.multiplied if coloured else None))
+                io.write(temporary, image, notes=replace(like, multiplied=like.multiplied if coloured else None))
             else:
-                _outputs.write_like(temporary, image, _outputs.find_volume(paths[0], 3))
+                _outputs.write_like(temporary, image, _outputs.find_volume(paths[0], 3), notes=like)
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
 
 

@@ -8,7 +8,6 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,7 +24,7 @@ from texrs.cli._places import PLACED, say_places
 from texrs.cli._provenance import RUNNING, as_flag, check_free, read_status
 from texrs.cli._tails import split_tail
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.io.annotation import name_sidecar, needs_sidecar
+from texrs.io.annotation import name_sidecar, needs_sidecar, write_record
 from texrs.io.files import find_suffix
 from texrs.io.formats import RAW, STORE, check, detect_kind, holds_spacing, keeps_spacing
 from texrs.io.pillow import write_indexed
@@ -295,14 +294,13 @@ def write_output(
     option: str = "out",
     *,
     inside: bool = False,
-    like: io.Metadata | None = None,
     suffix: str = "",
     made: _provenance.Record | None = None,
 ) -> Iterator[Path]:
     """Provide a temporary name for a file that becomes ``path`` at the end. Errors name ``path``.
 
     The file contains the record of the command, or the record ``made``. If ``inside`` is True, the option names the
-    folder of the file. ``like`` is the colour description of the source image.
+    folder of the file.
     """
     if find_suffix(Path(path)).lower() == STORE:
         raise FileError(f"{path}: only texrs solid, synthesize, tiles and apply write Zarr stores")
@@ -311,10 +309,9 @@ def write_output(
         try:
             yield temporary
             running = made or RUNNING.get()
-            notes = like or io.Metadata()
             if running is not None:
-                notes = replace(notes, made=running.tell(path, output=option, inside=inside, suffix=suffix))
-            io.write_metadata(temporary, notes, os.path.realpath(path))
+                said = running.tell(path, output=option, inside=inside, suffix=suffix)
+                write_record(temporary, said, Path(os.path.realpath(path)))
         except TexrsError as error:
             message = str(error).replace(str(temporary), path)
             if message.startswith("array:"):
@@ -335,9 +332,7 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
             target = os.path.join(path, file.name)
             check_free(target, option)
             if running is not None:
-                io.write_metadata(
-                    file, io.Metadata(made=running.tell(target, output=option, inside=True, suffix=suffix))
-                )
+                write_record(file, running.tell(target, output=option, inside=True, suffix=suffix))
             if (beside := name_sidecar(file)).exists():
                 put(beside, name_sidecar(Path(target)))
             put(file, Path(target))
@@ -404,19 +399,22 @@ def deliver(
     out = paths["out"] or ""
     image, axes = np.asarray(result.image), result.source_map.axes
     suffix = find_suffix(Path(out))
-    known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
     # Give the result its final name only after all other files are written.
-    with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
-        if axes == 2:
-            palette = None if like is None else like.palette
-            if palette is None or not write_indexed(temporary, image, palette):
-                io.write(temporary, result.image, notes=like)
-        else:
-            write_like(temporary, image, volume, spacing)
+    with write_output(out, option, inside=option != "out", made=made) as temporary:
+        if axes == 3:
+            write_like(temporary, image, volume, spacing, notes=like)
+        elif like is None or not write_indexed(temporary, image, like):
+            io.write(temporary, result.image, notes=like)
         deliver_beside(result, paths, suffix, made)
 
 
-def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[float] | None = None) -> None:
+def write_like(
+    path: Path,
+    image: Array,
+    volume: str | None,
+    spacing: Sequence[float] | None = None,
+    notes: io.Metadata | None = None,
+) -> None:
     """Write a volume with the position of another file, as far as the format can store it."""
     stated = spacing or (None if volume is None else io.read_spacing(volume))
     suffix = find_suffix(path).lower()
@@ -425,12 +423,12 @@ def write_like(path: Path, image: Array, volume: str | None, spacing: Sequence[f
             ignore(
                 f"{volume or '--spacing'}: the spacing is not kept, because {suffix} of {image.dtype} cannot store it"
             )
-        io.write_volume(path, image)
+        io.write_volume(path, image, notes=notes)
         return
     kind = "" if volume is None else detect_kind(Path(volume))
     if kind in PLACING and not suffix[1:].startswith(kind[:3]):
         ignore(f"{volume}: its orientation, origin and unit are not kept, because only the same format can take them")
-    io.write_volume(path, image, spacing=stated, like=volume)
+    io.write_volume(path, image, spacing=stated, like=volume, notes=notes)
 
 
 def deliver_beside(

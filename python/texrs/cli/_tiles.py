@@ -136,7 +136,7 @@ def tiles_command(
     if made.material is None or single:
         notes = io.read_metadata(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Metadata()
         like = io.Metadata(profile=notes.profile, srgb=notes.srgb, multiplied=notes.multiplied)
-        with _outputs.write_output(out, like=like) as temporary:
+        with _outputs.write_output(out) as temporary:
             io.write(temporary, made.image, notes=like)
     else:
         stack.deliver(made, {"out": out})

@@ -185,8 +185,9 @@ class Verb:
             if issubclass(warning.category, UserWarning):
                 note(str(warning.message), quiet=quiet)
         if small and material is None:
-            with _outputs.write_output(out, like=like) as temporary:
-                io.write(temporary, _outputs.make_contact_sheet(small))
+            with _outputs.write_output(out) as temporary:
+                sheet_notes = replace(like, georeference=(), multiplied=None)
+                io.write(temporary, _outputs.make_contact_sheet(small), notes=sheet_notes)
         assert made is not None
         sheet = " and their contact sheet" if material is None else ""
         many = f"{len(small)} textures{sheet}, each " if small else ""

@@ -95,7 +95,8 @@ class Folder:
                 return False
             # Write the manifest first: a leftover file is harmless, but an entry without its file would be damaged.
             self._write(found)
-            for file in (record.file, f"{name}.npy" if record.image == f"{name}.npy" else None):
+            pixels = f"{name}.npy" if record.image == f"{name}.npy" else None
+            for file in (record.file, f"{record.file}.json", pixels):
                 if file is not None:
                     (self.path / file).unlink(missing_ok=True)
         return True

@@ -50,13 +50,14 @@ none. An image of one channel is read without a channel axis, except from ``.npy
 
 The content of a file decides how it is read (for TGA, the suffix). The suffix decides how it is written. The size in a
 header is compared with the limit before memory is allocated. `read_metadata` reads metadata, such as ICC profiles,
-densities and the record of how texrs made a file, and `write_metadata` writes them. Every file is first written under
+densities and the record of how texrs made a file, and `write` writes them (``notes``). Every file is first written under
 a temporary name and then renamed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import chain
 from math import atan, degrees, prod
 from pathlib import Path
@@ -90,7 +91,7 @@ from texrs.io._notes import Metadata
 from texrs.io._npy import Header, read_arrays, read_headers
 from texrs.io._vectors import read_vectors
 from texrs.io._zarr import is_store
-from texrs.io.annotation import read_metadata, write_metadata
+from texrs.io.annotation import read_metadata
 from texrs.io.files import atomic, find_suffix
 from texrs.io.formats import FORMATS, READ_IMAGES, STORE, VOLUMES, as_spacing, check, detect_kind, holds_spacing
 from texrs.io.grids import READERS, read_numpy, read_spacing, read_unit
@@ -110,7 +111,6 @@ __all__ = [
     "read_vectors",
     "read_volume",
     "write",
-    "write_metadata",
     "write_slabs",
     "write_surface",
     "write_volume",
@@ -335,9 +335,10 @@ def write(
     description : str, optional
         Description in ASCII. Only PNG and TIFF store it (`read_description`). Default: None.
     notes : Metadata, optional
-        Metadata that `write_metadata` cannot write. TIFF files keep the georeference. Colours are multiplied by alpha
-        in EXR files and divided by alpha in all other files, unless ``multiplied`` states that this is already done.
-        Default: None.
+        Metadata to write, as far as the format can store them. PNG, TIFF, JPEG, WebP and AVIF files store the ICC
+        profile. PNG, TIFF, EXR, JPEG and BMP files store the pixel density. PNG files store the gamma, PNG and EXR
+        files the primaries, and TIFF files the georeference. Colours are multiplied by alpha in EXR files and divided by alpha
+        in all other files, unless ``multiplied`` states that this is already done. Default: None.
 
     Raises
     ------
@@ -361,7 +362,7 @@ def write(
         raise InvalidInput(f"description: must be an ASCII string, got {description!r}")
     said = Metadata(multiplied=None) if notes is None else as_instance(notes, "notes", Metadata)
     array = _alpha.adapt(array, files.as_path(path), said.multiplied)
-    _write(path, array, 2, overwrite, None, description, said.georeference)
+    _write(path, array, 2, overwrite, None, said, description)
 
 
 def write_volume(
@@ -371,6 +372,7 @@ def write_volume(
     overwrite: bool = True,
     spacing: Sequence[float] | None = None,
     like: PathLike | None = None,
+    notes: Metadata | None = None,
 ) -> None:
     """Write a volume to a file or a Zarr store. If writing fails, an existing file is unchanged.
 
@@ -391,6 +393,9 @@ def write_volume(
     like : path_like, optional
         Volume whose spacing is copied. Orientation, origin and units are also copied between two NRRD files or two
         NIfTI files, and the unit between two TIFF files. Default: None.
+    notes : Metadata, optional
+        Metadata to write. Only TIFF files store them: the ICC profile, and the pixel density if no spacing is given.
+        Default: None.
 
     Raises
     ------
@@ -410,7 +415,8 @@ def write_volume(
     (5, 4, 3, 3)
 
     """
-    _write(path, array, 3, overwrite, spacing, like=None if like is None else files.as_path(like))
+    said = Metadata() if notes is None else as_instance(notes, "notes", Metadata)
+    _write(path, array, 3, overwrite, spacing, said, like=None if like is None else files.as_path(like))
 
 
 def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
@@ -460,7 +466,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
             _npy.write_parts(temporary, whole, sides, first.dtype)
         else:
             channels, size = prod(sides[3:]), prod(sides) * first.itemsize
-            _tiff.write_tiff(temporary, _slabs.split_planes(whole), channels, size)
+            _tiff.write_tiff(temporary, _slabs.split_planes(whole), channels, size, Metadata())
 
 
 def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
@@ -516,8 +522,8 @@ def _write(
     axes: int,
     overwrite: bool,
     spacing: Sequence[float] | None,
+    notes: Metadata,
     description: str | None = None,
-    tags: Sequence[tuple[int, int, int, object]] = (),
     like: Path | None = None,
 ) -> None:
     target = files.as_path(path)
@@ -537,19 +543,20 @@ def _write(
         if array.dtype == np.bool_ and suffix not in (".npy", ".npz"):
             array = array.astype(np.uint8) * np.uint8(255)
         flat = array[..., 0] if array.ndim > axes and array.shape[-1] == 1 else array
+        channels = flat.shape[axes] if flat.ndim > axes else 1
+        notes = notes.fit(min(channels, 5))
         match suffix:
             case ".npy":
                 _npy.write_npy(temporary, array)
             case ".npz":
                 _npy.write_npz(temporary, array)
             case ".tif" | ".tiff":
-                channels = flat.shape[axes] if flat.ndim > axes else 1
                 planes = flat.reshape(-1, *flat.shape[axes - 2 : axes], channels)
                 # Only TIFF files in the form of ImageJ store a spacing.
                 if spacing is None:
-                    _tiff.write_tiff(temporary, planes, channels, planes.nbytes, description, tags)
+                    _tiff.write_tiff(temporary, planes, channels, planes.nbytes, notes, description)
                 elif _tiff.keeps_spacing(planes.dtype, channels):
-                    _tiff.write_imagej(temporary, planes, steps, read_unit(like))
+                    _tiff.write_imagej(temporary, planes, steps, read_unit(like), notes.profile)
                 else:
                     raise InvalidInput(
                         "spacing: .tif can store it only for uint8, uint16 and float32 with one channel, and for "
@@ -563,13 +570,13 @@ def _write(
                 header = _find_header(like, "nii", "nii.gz")
                 _volumes.write_nifti(temporary, flat, steps, header, compressed=suffix == ".nii.gz")
             case ".exr":
-                exr_layers.write_image(temporary, flat)
+                exr_layers.write_image(temporary, flat, notes)
             case ".png" | ".hdr":
                 file = image_io.encode(target, flat, suffix[1:])
-                described = suffix == ".png" and description is not None
-                temporary.write_bytes(_png_chunks.describe_png(file, description or "") if described else file)
+                added = replace(notes, made=None)
+                temporary.write_bytes(_png_chunks.add_chunks(file, added, description) if suffix == ".png" else file)
             case _:
-                temporary.write_bytes(pillow.encode(target, flat, suffix))
+                temporary.write_bytes(pillow.encode(target, flat, suffix, notes=notes))
 
 
 def _find_header(like: Path | None, *kinds: str) -> Any:

@@ -17,7 +17,6 @@ from texrs._notices import ignore
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput, LimitExceeded
-from texrs.io._texts import MEMBER
 from texrs.io.files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
 
 MAGIC = b"\x93NUMPY"
@@ -212,7 +211,8 @@ def _find_members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfi
     """Return the (archive member, header) of each array by key."""
     found = {}
     for member in archive.infolist():
-        if member.filename != MEMBER:
+        # Earlier versions stored the record of the command as another member.
+        if member.filename != "texrs.json":
             with _open_member(path, archive, member) as stream:
                 found[member.filename.removesuffix(".npy")] = member, _read_header(path, stream)
     return found

@@ -1,4 +1,4 @@
-"""Add metadata to PNG, JPEG and GIF files without encoding their pixels again. Pillow reads these metadata."""
+"""Add metadata to PNG files, because Pillow cannot encode colours of 16 bits. Pillow reads these metadata."""
 
 from __future__ import annotations
 
@@ -7,24 +7,14 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from texrs.io._notes import INCH, Metadata
+from texrs.io._notes import Metadata
 
 KEYWORD = b"texrs\0\0\0\0\0"
 """Keyword of a PNG text chunk, followed by its flags: not compressed, no language, no translation."""
-_START, _HEADER = 8, 33
-"""Length of the PNG signature, and offset of the end of the header chunk, in bytes."""
+_START = 8
+"""Length of the PNG signature in bytes."""
 _COLOURS = frozenset({b"iCCP", b"sRGB", b"gAMA", b"cHRM"})
 """PNG chunks that define colours. If one is replaced, all are."""
-_PART = 65_519
-"""Maximum number of bytes of a profile in one JPEG segment."""
-
-
-def encode_record(kind: str, made: str) -> bytes:
-    """Return a record as the bytes that a PNG, JPEG, GIF, TIFF or EXR file contains."""
-    text = made.encode()
-    if kind != "gif":
-        return text
-    return b"".join(bytes((len(text[i : i + 255]),)) + text[i : i + 255] for i in range(0, len(text), 255))
 
 
 def _frame(kind: bytes, body: bytes) -> bytes:
@@ -41,14 +31,11 @@ def _walk(data: bytes) -> Iterator[bytes]:
         at = end
 
 
-def describe_png(file: bytes, text: str) -> bytes:
-    """Return a PNG file with a text chunk for the description added."""
-    return file[:_HEADER] + _frame(b"tEXt", b"Description\0" + text.encode("latin-1")) + file[_HEADER:]
-
-
-def write_png(path: Path, notes: Metadata) -> None:
-    """Insert metadata chunks after the header of a PNG file, and remove the chunks that they replace."""
+def add_chunks(data: bytes, notes: Metadata, description: str | None = None) -> bytes:
+    """Return a PNG file with metadata after its header, without the chunks that they replace."""
     new = []
+    if description is not None:
+        new.append((b"tEXt", b"Description\0" + description.encode("latin-1")))
     if notes.made is not None:
         new.append((b"iTXt", KEYWORD + notes.made.encode()))
     if notes.profile is not None:
@@ -62,45 +49,19 @@ def write_png(path: Path, notes: Metadata) -> None:
     if notes.density is not None:
         down, across = (min(max(round(d), 1), 2**31 - 1) for d in notes.density)
         new.append((b"pHYs", struct.pack(">IIB", across, down, 1)))
+    if not new:
+        return data
     kinds = {kind for kind, _ in new}
-    former = kinds - {b"iTXt"} | (_COLOURS if kinds & _COLOURS else frozenset())
-    data = path.read_bytes()
+    former = kinds - {b"iTXt", b"tEXt"} | (_COLOURS if kinds & _COLOURS else frozenset())
+    header, *rest = _walk(data)
     kept = [
         chunk
-        for chunk in _walk(data)
+        for chunk in rest
         if chunk[4:8] not in former and not (notes.made is not None and chunk[4:].startswith(b"iTXt" + KEYWORD))
     ]
-    path.write_bytes(b"".join([data[:_START], kept[0], *(_frame(*chunk) for chunk in new), *kept[1:]]))
+    return b"".join([data[:_START], header, *(_frame(*chunk) for chunk in new), *kept])
 
 
-def write_jpeg(path: Path, notes: Metadata, former: bytes) -> None:
-    """Insert the record and the profile after the first segment of a JPEG file, and set the density in that segment."""
-    data = path.read_bytes()
-    if former and notes.made is not None:
-        at = data.index(former)
-        data = data[: at - 4] + data[at + len(former) :]
-    first = 4 + int.from_bytes(data[4:6], "big")
-    head, new = data[:first], []
-    if notes.density is not None and head[6:11] == b"JFIF\0":
-        down, across = (min(max(round(d * INCH), 1), 65_535) for d in notes.density)
-        head = head[:13] + struct.pack(">BHH", 1, across, down) + head[18:]
-    if notes.made is not None:
-        new.append(b"\xff\xfe" + struct.pack(">H", len(notes.made.encode()) + 2) + notes.made.encode())
-    profile = notes.profile or b""
-    count = -(-len(profile) // _PART)
-    for i in range(count if count < 256 else 0):
-        part = b"ICC_PROFILE\0" + bytes((i + 1, count)) + profile[i * _PART : (i + 1) * _PART]
-        new.append(b"\xff\xe2" + struct.pack(">H", len(part) + 2) + part)
-    path.write_bytes(b"".join([head, *new, data[first:]]))
-
-
-def write_gif(path: Path, notes: Metadata, former: bytes) -> None:
-    """Insert the record as a comment after the palette of a GIF file, in place of the former record."""
-    if notes.made is None:
-        return
-    data = path.read_bytes()
-    if former:
-        at = data.index(former)
-        data = data[: at - 2] + data[at + len(former) + 1 :]
-    first = 13 + (3 << (data[10] & 7) + 1 if data[10] & 0x80 else 0)
-    path.write_bytes(data[:first] + b"!\xfe" + encode_record("gif", notes.made) + b"\0" + data[first:])
+def write_record(path: Path, made: str) -> None:
+    """Write the record of how texrs made a PNG file into a text chunk."""
+    path.write_bytes(add_chunks(path.read_bytes(), Metadata(made=made)))

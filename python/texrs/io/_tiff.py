@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import lzma
 import re
-import struct
 import threading
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -214,12 +213,16 @@ def write_tiff(
     planes: Iterable[Array],
     channels: int,
     size: int,
+    notes: Metadata,
     description: str | None = None,
-    tags: Sequence[tuple[int, int, int, Any]] = (),
 ) -> None:
     """Write planes (rows, columns, channels) of ``size`` bytes in total, uncompressed, one page per plane."""
     import tifffile
 
+    # Only the first page contains the metadata, and the tag Software, which is reserved for the record.
+    first: dict[str, Any] = {"software": SOFTWARE, "iccprofile": notes.profile}
+    if notes.density is not None:
+        first |= {"resolution": [step * INCH for step in notes.density[::-1]], "resolutionunit": "INCH"}
     options: dict[str, Any] = {
         "photometric": "rgb" if channels in (3, 4) else "minisblack",
         "planarconfig": "contig" if channels > 1 else None,
@@ -227,15 +230,14 @@ def write_tiff(
             channels, ["unspecified"] * (channels - 1)
         ),
         "description": description,
-        "extratags": [(*tag, True) for tag in tags],
+        "extratags": [(*tag, True) for tag in notes.georeference],
         "metadata": None,
     }
     # Use BigTIFF for large files, because 32-bit offsets end at 4 GB.
     with tifffile.TiffWriter(path, bigtiff=size > 2**32 - 2**25) as tif:
         for number, plane in enumerate(planes):
-            # Reserve the tag Software of the first page for the record.
-            software = SOFTWARE if number == 0 else False
-            tif.write(plane if channels > 1 else plane[..., 0], software=software, **options)
+            more = {"software": False} if number else first
+            tif.write(plane if channels > 1 else plane[..., 0], **more, **options)
 
 
 def keeps_spacing(dtype: np.dtype[Any], channels: int) -> bool:
@@ -243,7 +245,7 @@ def keeps_spacing(dtype: np.dtype[Any], channels: int) -> bool:
     return (dtype.name, channels) in {("uint8", 1), ("uint16", 1), ("float32", 1), ("uint8", 3)}
 
 
-def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str) -> None:
+def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str, profile: bytes | None) -> None:
     """Write a volume (D, H, W, C) and its spacing (z, y, x) in the TIFF form of ImageJ."""
     import tifffile
 
@@ -253,7 +255,8 @@ def write_imagej(path: Path, volume: Array, spacing: Sequence[float], unit: str)
         said["unit"] = unit
     shown = volume if coloured else volume[..., 0]
     with tifffile.TiffWriter(path, imagej=True) as tif:
-        tif.write(shown, resolution=(1 / spacing[2], 1 / spacing[1]), metadata=said, software=SOFTWARE)
+        resolution = 1 / spacing[2], 1 / spacing[1]
+        tif.write(shown, resolution=resolution, metadata=said, software=SOFTWARE, iccprofile=profile)
 
 
 def read_notes(path: Path) -> dict[str, Any]:
@@ -275,43 +278,12 @@ def read_notes(path: Path) -> dict[str, Any]:
     return found
 
 
-def write_notes(path: Path, notes: Metadata) -> None:
-    """Write metadata into the first page of a file that `write_tiff` or `write_imagej` wrote."""
+def write_record(path: Path, made: str) -> None:
+    """Write the record of how texrs made a file into the tag Software, which `write_tiff` and `write_imagej` reserve."""
     import tifffile
 
     with tifffile.TiffFile(path, mode="r+", is_ome=False) as tif:
-        tags = tif.pages.first.tags
-        if notes.made is not None:
-            tags[_SOFTWARE].overwrite(notes.made.encode())
-        if notes.density is not None:
-            for code, metre in ((_DOWN, notes.density[0]), (_ACROSS, notes.density[1])):
-                tags[code].overwrite((min(round(metre * INCH * 10_000), 2**32 - 1), 10_000))
-            tags[_UNIT].overwrite(2)
-        if notes.profile is not None:
-            _add_profile(tif, notes.profile)
-
-
-def _add_profile(tif: Any, profile: bytes) -> None:
-    """Add an ICC profile to the first page.
-
-    tifffile cannot add tags, so the directory is rewritten at the end of the file.
-    """
-    file, layout = tif.filehandle, tif.tiff
-    file.seek(tif.pages.first.offset)
-    count = int(struct.unpack(layout.tagnoformat, file.read(layout.tagnosize))[0])
-    entries = [file.read(layout.tagsize) for _ in range(count)]
-    following, at = file.read(layout.offsetsize), file.seek(0, 2)
-    place = struct.pack(layout.offsetformat, len(profile)) + struct.pack(layout.offsetformat, at)
-    added = struct.pack(layout.tagformat1[:3], _PROFILE, 7) + place
-    entries = [e for e in entries if e[:2] != added[:2]] + [added]
-    entries.sort(key=lambda entry: struct.unpack(layout.tagnoformat[0] + "H", entry[:2]))
-    start = at + len(profile) + len(profile) % 2
-    if start > 2 ** (8 * layout.offsetsize) - 2**17:
-        raise FileError("the ICC profile does not fit, because a classic TIFF file cannot exceed 4 GiB")
-    number = struct.pack(layout.tagnoformat, len(entries))
-    file.write(b"".join([profile.ljust(start - at, b"\0"), number, *entries, following]))
-    file.seek(layout.offsetsize)
-    file.write(struct.pack(layout.offsetformat, start))
+        tif.pages.first.tags[_SOFTWARE].overwrite(made.encode())
 
 
 @contextmanager

@@ -142,11 +142,19 @@ def write_layers(path: PathLike, channels: Mapping[str, Array], words: str) -> N
         _write(temporary, channels, {MAPS: words})
 
 
-def write_image(path: Path, image: Array) -> None:
+def write_image(path: Path, image: Array, notes: Metadata) -> None:
     """Write an image of float16 or float32, (H, W) or (H, W, C), with up to four channels."""
+    head: dict[str, object] = {}
+    if notes.primaries is not None:
+        head["chromaticities"] = (*notes.primaries[2:], *notes.primaries[:2])
+    if notes.density is not None:
+        down, across = notes.density
+        head["xDensity"] = across * INCH
+        if abs(down / across - 1) > 1e-3:
+            head["pixelAspectRatio"] = down / across
     planes = image[..., np.newaxis] if image.ndim == 2 else image
     names = next(names for names in PICTURES if len(names) == planes.shape[2])
-    _write(path, {name: planes[..., k] for k, name in enumerate(names)}, {})
+    _write(path, {name: planes[..., k] for k, name in enumerate(names)}, head)
 
 
 def _write(path: Path, channels: Mapping[str, Array], attributes: Mapping[str, object]) -> None:
@@ -172,17 +180,8 @@ def read_notes(path: Path) -> dict[str, Any]:
     return found
 
 
-def write_notes(path: Path, notes: Metadata) -> None:
-    """Rewrite a file with other metadata."""
+def write_record(path: Path, made: str) -> None:
+    """Write the record of how texrs made a file into its header."""
     file = _open(path)
-    head = file.header()
-    if notes.primaries is not None:
-        head["chromaticities"] = (*notes.primaries[2:], *notes.primaries[:2])
-    if notes.density is not None:
-        down, across = notes.density
-        head["xDensity"] = across * INCH
-        if abs(down / across - 1) > 1e-3:
-            head["pixelAspectRatio"] = down / across
-    if notes.made is not None:
-        head[MADE] = notes.made
+    file.header()[MADE] = made
     file.write(str(path))

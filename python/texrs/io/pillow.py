@@ -21,6 +21,7 @@ from texrs._checks import as_limit
 from texrs._notices import assume, ignore
 from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
+from texrs.io import _png_chunks
 from texrs.io._notes import INCH, MARK, Metadata
 from texrs.io.files import check_size, describe_error, translate_errors, turn_upright
 
@@ -61,6 +62,8 @@ SAVED: dict[str, tuple[str, dict[str, Any]]] = {
     ".avif": ("AVIF", {"quality": 95, "subsampling": "4:4:4", "max_threads": 1, "autotiling": False}),
     ".jxl": ("JXL", {"lossless": True}),
 }
+PROFILED = ("JPEG", "WEBP", "AVIF")
+"""Formats whose ICC profile Pillow writes."""
 INDEXED = (".png", ".gif", ".bmp", ".tga")
 """Suffixes of formats with palettes."""
 PLUGINS = {"jxl": ("pillow_jxl", "jxlpy.JXLImagePlugin")}
@@ -174,12 +177,6 @@ def read_notes(path: Path, kind: str) -> dict[str, Any]:
             raise
         info, exif = image.info, Image.Exif()
         exif.load(info.get("exif") or b"")
-        texts = [
-            info.get("texrs"),
-            info.get("comment"),
-            *(text for key, text in getattr(image, "applist", ()) if key == "COM"),
-        ]
-        texts = [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in texts]
         density = _find_density(kind, info, exif)
         if density is not None and exif.get(ORIENTATION, 1) > 4:
             density = density[::-1]
@@ -189,7 +186,7 @@ def read_notes(path: Path, kind: str) -> dict[str, Any]:
             "srgb": "srgb" in info or exif.get_ifd(EXIF).get(SPACE) == 1,
             "gamma": info.get("gamma"),
             "primaries": info.get("chromaticity"),
-            "made": next((text for text in texts if text and text.startswith(MARK)), None),
+            "made": text if (text := info.get("texrs")) and text.startswith(MARK) else None,
         }
 
 
@@ -204,16 +201,6 @@ def _find_density(kind: str, info: dict[str, Any], exif: Any) -> tuple[float, fl
         unit, steps, least = int(exif.get(UNIT, 2)) - 1, (exif.get(ACROSS, 0), exif.get(DOWN, 0)), 1 / INCH
     across, down = (float(step) / (INCH if unit == 1 else 0.01) for step in steps or (0, 0))
     return (down, across) if unit in (1, 2) and least < min(across, down) and max(across, down) < 1e9 else None
-
-
-def write_notes(path: Path, notes: Metadata, kind: str) -> None:
-    """Write a WebP file again with a profile, or a BMP file with a density."""
-    data = path.read_bytes()
-    with _open(path, kind, data) as image:
-        if kind == "webp" and notes.profile is not None and data[12:16] == b"VP8L":
-            image.save(path, "WEBP", icc_profile=notes.profile, **SAVED[".webp"][1])
-        elif kind == "bmp" and notes.density is not None:
-            image.save(path, "BMP", dpi=tuple(step * INCH for step in notes.density[::-1]))
 
 
 def read_description(path: Path) -> str | None:
@@ -237,8 +224,8 @@ def read_focal(path: Path) -> float | None:
     return None
 
 
-def encode(path: Path, array: Array, suffix: str, palette: Array | None = None) -> bytes:
-    """Encode uint8 pixels as a file, or as indices if a palette is given."""
+def encode(path: Path, array: Array, suffix: str, palette: Array | None = None, notes: Metadata | None = None) -> bytes:
+    """Encode uint8 pixels as a file, or as indices if a palette is given, with the metadata that Pillow can write."""
     from PIL import Image
 
     name, options = SAVED[suffix]
@@ -253,21 +240,26 @@ def encode(path: Path, array: Array, suffix: str, palette: Array | None = None) 
     if palette is not None and (palette[:, 3:] < 255).any() and suffix in (".png", ".gif"):
         clear = palette[:, 3]
         options = options | {"transparency": clear.tobytes() if suffix == ".png" else int(clear.argmin())}
+    if notes is not None and notes.profile is not None and name in PROFILED:
+        options = options | {"icc_profile": notes.profile}
+    if notes is not None and notes.density is not None and name in ("JPEG", "BMP"):
+        options = options | {"dpi": tuple(min(max(step * INCH, 1), 65_535) for step in notes.density[::-1])}
     file = BytesIO()
     image.save(file, name, **options)
     return file.getvalue()
 
 
-def write_indexed(path: Path, array: Array, palette: bytes) -> bool:
-    """Write an image with a palette; return False if the format or the palette cannot represent it."""
-    suffix, table = path.suffix.lower(), np.frombuffer(palette, np.uint8).reshape(-1, 4)
-    if suffix not in INDEXED or find_indices(array, table) is None:
+def write_indexed(path: Path, array: Array, notes: Metadata) -> bool:
+    """Write an image with the palette of ``notes``; return False if the format or palette cannot represent it."""
+    suffix, table = path.suffix.lower(), np.frombuffer(notes.palette or b"", np.uint8).reshape(-1, 4)
+    if suffix not in INDEXED or not len(table) or find_indices(array, table) is None:
         return False
     clear, half = (table[:, 3] == 0).sum(), (table[:, 3] % 255).any()
     if suffix != ".png" and (half or clear > (suffix == ".gif")):
         return False
     with translate_errors(path, "writing"):
-        path.write_bytes(encode(path, array, suffix, table))
+        file = encode(path, array, suffix, table, notes)
+        path.write_bytes(_png_chunks.add_chunks(file, notes) if suffix == ".png" else file)
     return True
 
 
