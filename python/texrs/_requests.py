@@ -77,11 +77,13 @@ class Word(Generic[Given, Kept]):
         Function that gets a value and the name of the parameter. It returns the checked value, or raises an error.
     default : object
         Default value for callers, which is checked like all others. Without it, the parameter is required.
+    after : str
+        Name of the parameter that precedes a field of a subclass in the signature.
 
     """
 
-    def __init__(self, check: Callable[[Any, str], Kept], *, default: Given = MISSING) -> None:  # type: ignore[assignment]
-        self.check, self.default, self.name = check, default, ""
+    def __init__(self, check: Callable[[Any, str], Kept], *, default: Given = MISSING, after: str = "") -> None:  # type: ignore[assignment]
+        self.check, self.default, self.after, self.name = check, default, after, ""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -137,7 +139,12 @@ def request(kind: type[T]) -> type[T]:
 
 def make_signature(kind: Any, returned: Any) -> inspect.Signature:
     """Return the signature of a verb: the fields of its request, with the types of values that callers give."""
-    several = inspect.signature(kind).parameters.values()
+    several = list(inspect.signature(kind).parameters.values())
+    for each in tuple(several):
+        after = inspect.getattr_static(kind, each.name).after
+        if after:
+            several.remove(each)
+            several.insert([p.name for p in several].index(after) + 1, each)
     return inspect.Signature(
         [p.replace(annotation=_find_given(p.annotation)) for p in several], return_annotation=returned
     )
@@ -159,7 +166,7 @@ def describe(kind: Any) -> Iterator[str]:
     known = dict(DESCRIPTIONS)
     for owner in reversed(kind.__mro__):
         known |= {name: f"{form}: {text}" for name, form, text in ENTRY.findall(inspect.getdoc(owner) or "")}
-    for name in inspect.signature(kind).parameters:
+    for name in make_signature(kind, None).parameters:
         form, _, text = known[name][1:].partition("): ")
         yield f"{name} : {' '.join(form.split())}"
         yield from wrap(" ".join(text.split()), 115, initial_indent="    ", subsequent_indent="    ")

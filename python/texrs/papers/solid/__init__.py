@@ -56,96 +56,34 @@ Departures from the paper in the corrections (``quality="fast"``):
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
-from texrs._progress import answering, listen, stage
-from texrs._typing import Array, Interpolation, Progress
-from texrs._verbs import takes_materials
-from texrs.exemplar import Exemplar
-from texrs.fields import FieldLike
-from texrs.growth import Constraints, Grown, Guide, Windows, grow, keep
+from texrs._progress import answering, stage
+from texrs._typing import Array, Progress
+from texrs._verbs import verb
+from texrs.growth import Grown, Windows, grow, keep
 from texrs.growth.engine import Places, Show
-from texrs.materials import Material
 from texrs.papers.solid.literal import grow_as_printed
-from texrs.papers.solid.plans import PLANS, Choice, Plan, choose_plan
-from texrs.papers.solid.request import Method, Request
-from texrs.papers.solid.settings import FAST, Quality
+from texrs.papers.solid.plans import PLANS, Plan, choose_plan
+from texrs.papers.solid.request import GrowthRequest, Solid, Synthesize
+from texrs.papers.solid.settings import FAST
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["solid", "synthesize"]
 
 
-@takes_materials("exemplar")
-def solid(
-    exemplar: Array | Exemplar | Material,
-    size: int | Sequence[int],
-    *,
-    field: FieldLike | None = None,
-    seed: int = 0,
-    wrap: bool | Sequence[bool] | None = None,
-    quality: Quality = "preserve",
-    bend_patches: bool | None = None,
-    method: Method = None,
-    constraints: Constraints | None = None,
-    guide: Guide | None = None,
-    interpolation: Interpolation | None = None,
-    spacing: Sequence[float] | None = None,
-    memory_limit: int | None = None,
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(Solid, "exemplar")
+def solid(asked: Solid) -> Synthesis:
     """Synthesise a volume from an example volume. The texture can follow a frame field.
 
     Parameters
     ----------
-    exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
-        Example volume, of any real dtype and number of channels, at least 16 voxels a side. A `texrs.Exemplar` with
-        ``axes=3`` states whether its values are labels, and along which axes it is periodic; for other types, both are
-        measured.
-    size : int or (planes, rows, columns)
-        Size of the result in voxels. One number gives a cube.
-    field : Field, str, array_like or path_like, optional
-        Field that rotates and scales the texture at each voxel (`texrs.fields`). Python accepts a field or its words.
-        Python also accepts directions (P, R, C, 3) or frames (P, R, C, 3, 3) over the output, as an array or a file.
-        None leaves the texture as it is.
-    seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
-    wrap : bool or (planes, rows, columns), optional
-        Axes along which the result is periodic. Default: none.
-    quality : {"preserve", "fast", "optimise"}
-        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
-        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
-        for textures without elements. Default: "preserve".
-    bend_patches : bool, optional
-        If True, patches are bent along the field, which suits courses and nets. If False, they are rotated and scaled
-        as a whole, which suits separate elements. Default: False if the exemplar has separate elements.
-    method : {None, "paper", "paper-compensated"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
-        Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
-        and both look up the nearest sample by default. Default: the algorithm with departures from the paper.
-    constraints : Constraints, optional
-        Given voxels, specified by their values or by their source coordinates (`texrs.Constraints`).
-    guide : Guide, optional
-        A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
-        (`texrs.Guide`).
-    interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples in the final look-up. Labels always use the nearest sample.
-        Default: "cubic".
-    spacing : (plane, row, column) float, optional
-        Voxel size along each axis of the exemplar and of the result, in any unit. The field rotates and scales the
-        texture in space, not in voxels, and its places and lengths are in this unit. Default: the spacing that the
-        exemplar's file states, else 1.
-    memory_limit : int, optional
-        Maximum memory of the computation in bytes. Default: the available memory, unless a lower limit is set
-        (`texrs.limits`).
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
-        raises stops the work. True shows a progress bar.
+    {parameters}
 
     Returns
     -------
@@ -210,92 +148,16 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
-    progress = listen(progress)
-    request = Request.check(
-        exemplar,
-        size,
-        axes=3,
-        field=field,
-        seed=seed,
-        wrap=wrap,
-        quality=quality,
-        bend_patches=bend_patches,
-        method=method,
-        constraints=constraints,
-        guide=guide,
-        interpolation=interpolation,
-        memory_limit=memory_limit,
-        spacing=spacing,
-    )
-    return grow_texture(request, progress)
+    return grow_texture(asked)
 
 
-@takes_materials("exemplar")
-def synthesize(
-    exemplar: Array | Exemplar | Material,
-    size: int | Sequence[int],
-    *,
-    field: FieldLike | None = None,
-    seed: int = 0,
-    wrap: bool | Sequence[bool] | None = None,
-    quality: Quality = "preserve",
-    bend_patches: bool | None = None,
-    patches: Choice = "default",
-    method: Method = None,
-    constraints: Constraints | None = None,
-    guide: Guide | None = None,
-    interpolation: Interpolation | None = None,
-    memory_limit: int | None = None,
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(Synthesize, "exemplar")
+def synthesize(asked: Synthesize) -> Synthesis:
     """Synthesise an image from an example image. The texture can follow a frame field.
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, or Exemplar
-        Example image, of any real dtype and number of channels, at least 16 pixels a side. A `texrs.Exemplar` states
-        whether its values are labels, and along which axes it is periodic; for other types, both are measured.
-    size : int or (int, int)
-        Size of the result in pixels. One number gives a square.
-    field : Field, str, array_like or path_like, optional
-        Field that rotates and scales the texture at each pixel (`texrs.fields`). Python accepts a field or its words.
-        Python also accepts directions (R, C, 2) or frames (R, C, 2, 2) over the output, as an array or a file. None
-        leaves the texture as it is.
-    seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
-    wrap : bool or (rows, columns), optional
-        Axes along which the result is periodic. Default: none.
-    quality : {"preserve", "fast", "optimise"}
-        Balance of quality and speed. "preserve" stitches patches along minimum cuts, which keeps elements whole.
-        "optimise" tries three times as many source positions for each patch. "fast" corrects blocks point by point,
-        for textures without elements. Default: "preserve".
-    bend_patches : bool, optional
-        If True, patches are bent along the field, which suits courses and nets. If False, they are rotated and scaled
-        as a whole, which suits separate elements. Default: False if the exemplar has separate elements.
-    patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        Method of stitching. "large": patches a quarter larger than the default, which tear fewer elements but copy
-        larger parts. "unmasked": seams may cross elements. "unmasked-large": both. "auto": each method is tried twice
-        on a small image and evaluated (`texrs.metrics`), and a clearly better one replaces the default. The report key
-        "candidates" contains the measures of each. Default: patches of the usual size, and seams that avoid elements
-        ("default").
-    method : {None, "paper", "paper-compensated"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison. "paper-compensated" adds the windows of
-        Lefebvre and Hoppe, which the paper omits. Neither can be combined with ``quality``, constraints or a guide,
-        and both look up the nearest sample by default. Default: the algorithm with departures from the paper.
-    constraints : Constraints, optional
-        Given pixels, specified by their values or by their source coordinates (`texrs.Constraints`).
-    guide : Guide, optional
-        A map that the result should follow, for exemplars with a trend, such as grains that grow downwards
-        (`texrs.Guide`).
-    interpolation : {"nearest", "linear", "cubic"}, optional
-        Interpolation between the exemplar's samples in the final look-up. Labels always use the nearest sample.
-        Default: "cubic".
-    memory_limit : int, optional
-        Maximum memory of the computation in bytes. Default: the available memory, unless a lower limit is set
-        (`texrs.limits`).
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the completed share of the stage. An exception that it
-        raises stops the work. True shows a progress bar.
+    {parameters}
 
     Returns
     -------
@@ -332,34 +194,18 @@ def synthesize(
     (96, 128, 3)
 
     """
-    progress = listen(progress)
-    request = Request.check(
-        exemplar,
-        size,
-        axes=2,
-        field=field,
-        seed=seed,
-        wrap=wrap,
-        quality=quality,
-        bend_patches=bend_patches,
-        patches=patches,
-        method=method,
-        constraints=constraints,
-        guide=guide,
-        interpolation=interpolation,
-        memory_limit=memory_limit,
-    )
-    return grow_texture(request, progress)
+    return grow_texture(asked)
 
 
-def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
+def grow_texture(asked: GrowthRequest) -> Synthesis:
     """Synthesise an image or a volume: compute its source map, and look up the exemplar."""
     said: dict[str, Any] = {"patches": None, "candidates": None}
-    show = partial(show_places, asked.exemplar.pixels)
+    progress = asked.progress
+    show = partial(show_places, asked.example.pixels)
     if asked.method is not None:
         grown = grow_as_printed(
-            asked.exemplar,
-            asked.field,
+            asked.example,
+            asked.frames,
             asked.seed,
             asked.region,
             show,
@@ -372,42 +218,42 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
     else:
         grown, said = stitch(asked, show, progress)
-    source = as_source(asked, grown).with_finish(asked.region.wrap, interpolation=asked.interpolation)
-    composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
+    source = as_source(asked, grown).with_finish(asked.region.wrap, interpolation=asked.sampling)
+    composite = source.render(asked.example.image, interpolation=asked.sampling)
     last = {} if grown.patches else {f"level {len(grown.levels)}": show(grown.places, asked.region, 1)}
     stages = {**grown.stages, **last, "before_blending": composite}
     return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, grown) | said)
 
 
-def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
+def stitch(asked: GrowthRequest, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
     """Stitch patches along minimum cuts, at full resolution. Return the result, and report keys of the method."""
-    name, tried = choose_plan(asked.exemplar, asked.patches, asked.quality, partial(try_plan, asked, progress))
-    start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend_patches)
-    frames = partial(to_fixed, asked.field)
+    name, tried = choose_plan(asked.example, asked.plan, asked.quality, partial(try_plan, asked, progress))
+    start = PLANS[name].start(asked.example, asked.seed, asked.quality, asked.bend_patches)
+    frames = partial(to_fixed, asked.frames)
     grown = grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
     return grown, {"patches": name, "candidates": tried}
 
 
-def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
+def try_plan(asked: GrowthRequest, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
     """Synthesise an image of the exemplar's size by one method, without a field or constraints."""
     stage(progress, "try")
-    region = Region.whole(asked.exemplar.shape, (False, False))
-    grown = grow(region, 1, plan.start(asked.exemplar, seed, asked.quality, None), keep, partial(to_fixed, None))
-    return SourceMap.from_coordinates(as_coordinates(grown.places, region), asked.exemplar.shape)
+    region = Region.whole(asked.example.shape, (False, False))
+    grown = grow(region, 1, plan.start(asked.example, seed, asked.quality, None), keep, partial(to_fixed, None))
+    return SourceMap.from_coordinates(as_coordinates(grown.places, region), asked.example.shape)
 
 
-def analyse(asked: Request) -> Windows:
+def analyse(asked: GrowthRequest) -> Windows:
     """Return the start and corrector of quality "fast": windows of the exemplar at each level, with their settings."""
-    return Windows(asked.exemplar.analyse(FAST.radii).levels, FAST, asked.seed, asked.field)
+    return Windows(asked.example.analyse(FAST.radii).levels, FAST, asked.seed, asked.frames)
 
 
-def as_source(asked: Request, grown: Grown) -> SourceMap:
+def as_source(asked: GrowthRequest, grown: Grown) -> SourceMap:
     """Return a source map from fixed-point coordinates, with the Jacobians of rigid patches or of the field."""
-    coordinates, shape = as_coordinates(grown.places, asked.region), asked.exemplar.shape
+    coordinates, shape = as_coordinates(grown.places, asked.region), asked.example.shape
     if grown.patches is None:
-        return SourceMap.from_coordinates(coordinates, shape, jacobian=asked.field)
-    rigid = asked.field is not None and asked.field.constant is None and not grown.patches.bent
-    frame = grown.patches.frames if rigid else asked.field
+        return SourceMap.from_coordinates(coordinates, shape, jacobian=asked.frames)
+    rigid = asked.frames is not None and asked.frames.constant is None and not grown.patches.bent
+    frame = grown.patches.frames if rigid else asked.frames
     labels = grown.patches.labels.reshape(asked.region.shape)
     return SourceMap.from_coordinates(coordinates, shape, label=labels, jacobian=frame)
 
@@ -429,33 +275,33 @@ def show_places(image: Array, places: Places, region: Region, spacing: int) -> A
     return image[at]
 
 
-def describe(asked: Request, grown: Grown) -> dict[str, Any]:
+def describe(asked: GrowthRequest, grown: Grown) -> dict[str, Any]:
     """Return the report of a synthesis, in JSON types."""
     levels = [done.report() for done in grown.levels]
     if asked.method is not None:
         levels = [{"shape": level["shape"], "passes": level["passes"]} for level in levels]
     elif asked.quality == "fast":
-        known = asked.exemplar.analyse(FAST.radii).levels[-len(levels) :]
+        known = asked.example.analyse(FAST.radii).levels[-len(levels) :]
         levels = [{**level, "spacing": round(here.spacing, 6)} for here, level in zip(known, levels, strict=True)]
     return {
         "method": asked.method or "default",
         "quality": None if asked.method else asked.quality,
         "seed": asked.seed,
-        "field": None if asked.field is None else asked.field.describe(),
-        "periodic_axes": list(asked.exemplar.repeat),
-        "interpolation": asked.interpolation,
+        "field": None if asked.frames is None else asked.frames.describe(),
+        "periodic_axes": list(asked.example.repeat),
+        "interpolation": asked.sampling,
         "constrained_points": asked.conditions.count,
         "guided": asked.conditions.maps is not None,
         "elements": _count_elements(asked),
         "stitched": None if grown.patches is None else grown.patches.report(),
         "levels": levels,
-        **({} if asked.spacing is None else {"spacing": list(asked.spacing)}),
+        **({} if asked.steps is None else {"spacing": list(asked.steps)}),
     }
 
 
-def _count_elements(asked: Request) -> int | None:
+def _count_elements(asked: GrowthRequest) -> int | None:
     """Return the number of separate elements in the exemplar, or None if they were not searched."""
     if asked.method is not None or asked.quality == "fast":
         return None
-    found = asked.exemplar.instances
+    found = asked.example.instances
     return 0 if found is None else found.count

@@ -1,16 +1,17 @@
-"""Check the arguments of `texrs.solid` and `texrs.synthesize` before the work begins."""
+"""Parameters of `texrs.solid` and `texrs.synthesize`, checked before the work begins."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from dataclasses import KW_ONLY
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from texrs._arrays import as_choice, as_method, as_seed, as_size, as_wrap
+from texrs._arrays import as_choice, as_size, as_wrap
 from texrs._engine.pyramid import Region
-from texrs._typing import Array, Interpolation
+from texrs._requests import PROGRESS, SEED, Request, Word, as_given, method, request, tied
+from texrs._typing import Array, Interpolation, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
@@ -23,105 +24,152 @@ from texrs.papers.solid.memory_check import LARGER, check_region
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
 
-__all__ = ["Method", "Request", "as_field", "as_interpolation"]
+__all__ = ["GrowthRequest", "Solid", "Synthesize", "as_field", "as_interpolation"]
 
 Method: TypeAlias = Literal["paper", "paper-compensated"] | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Request:
-    """Checked arguments of a synthesis.
+def as_bending(value: object, name: str) -> bool | None:
+    """Check whether patches are bent. None means that the exemplar determines it."""
+    if value is not None and not isinstance(value, bool):
+        raise InvalidInput(f"{name}: must be True, False or None, got {value!r}")
+    return value
 
-    Attributes
-    ----------
-    exemplar : Exemplar
-        Analysed exemplar.
-    region : Region
-        Shape and periodic axes of the output.
-    field : Field, optional
-        Frame field over the output. None leaves the texture as it is.
-    seed : int
-        Seed of the random choices.
-    quality : {"preserve", "fast", "optimise"}
-        Amount of work.
-    bend_patches : bool, optional
-        If True, patches are bent along the field. If None, the exemplar determines it.
-    patches : {"auto", "default", "large", "unmasked", "unmasked-large"}
-        Method of stitching.
-    method : {None, "paper", "paper-compensated"}
-        Algorithm: with departures from the paper, as printed, or as printed with compensated windows.
-    conditions : Conditions
-        Constraints and guide.
-    interpolation : {"nearest", "linear", "cubic"}
-        Interpolation between the exemplar's samples in the final look-up.
-    spacing : sequence of float, optional
-        Voxel size along each axis.
 
+@request
+class GrowthRequest(Request):
+    """Parameters of `texrs.solid` and `texrs.synthesize`.
+
+    - ``seed`` (int): Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
+    - ``quality`` ({"preserve", "fast", "optimise"}): Balance of quality and speed. "preserve" stitches patches along
+      minimum cuts, which keeps elements whole. "optimise" tries three times as many source positions for each patch.
+      "fast" corrects blocks point by point, for textures without elements. Default: "preserve".
+    - ``bend_patches`` (bool, optional): If True, patches are bent along the field, which suits courses and nets. If
+      False, they are rotated and scaled as a whole, which suits separate elements. Default: False if the exemplar has
+      separate elements.
+    - ``method`` ({None, "paper", "paper-compensated"}): Algorithm to use. "paper" is the algorithm as printed, for
+      comparison. "paper-compensated" adds the windows of Lefebvre and Hoppe, which the paper omits. Neither can be
+      combined with ``quality``, constraints or a guide, and both look up the nearest sample by default. Default: the
+      algorithm with departures from the paper.
+    - ``guide`` (Guide, optional): A map that the result should follow, for exemplars with a trend, such as grains that
+      grow downwards (`texrs.Guide`).
+    - ``interpolation`` ({"nearest", "linear", "cubic"}, optional): Interpolation between the exemplar's samples in the
+      final look-up. Labels always use the nearest sample. Default: "cubic".
+    - ``memory_limit`` (int, optional): Maximum memory of the computation in bytes. Default: the available memory,
+      unless a lower limit is set (`texrs.limits`).
     """
 
-    exemplar: Exemplar
-    region: Region
-    field: Field | None
-    seed: int
-    quality: Quality
-    bend_patches: bool | None
-    patches: Choice
-    method: Method
-    conditions: Conditions
-    interpolation: Interpolation
-    spacing: tuple[float, ...] | None = None
+    axes: ClassVar[int]
+    exemplar: Word[Array | Exemplar | Material, Any] = Word(as_given)
+    size: Word[int | Sequence[int], Any] = Word(as_given)
+    _: KW_ONLY
+    field: Word[FieldLike | None, Any] = Word(as_given, default=None)
+    seed: Word[int, int] = SEED
+    wrap: Word[bool | Sequence[bool] | None, Any] = Word(as_given, default=None)
+    quality: Word[Quality, Quality] = Word(lambda value, name: as_quality(value), default="preserve")
+    bend_patches: Word[bool | None, bool | None] = Word(as_bending, default=None)
+    method: Word[Method, Method] = Word(method(None, "paper", "paper-compensated"), default=None)
+    constraints: Word[Constraints | None, Any] = Word(as_given, default=None)
+    guide: Word[Guide | None, Any] = Word(as_given, default=None)
+    interpolation: Word[Interpolation | None, Any] = Word(as_given, default=None)
+    memory_limit: Word[int | None, Any] = Word(as_given, default=None)
+    progress: Word[Progress | bool | None, Progress | None] = PROGRESS
 
-    @classmethod
-    def check(
-        cls,
-        exemplar: Array | Exemplar | Material,
-        size: int | Sequence[int],
-        *,
-        axes: int,
-        field: FieldLike | None,
-        seed: int,
-        wrap: bool | Sequence[bool] | None,
-        quality: Quality,
-        bend_patches: bool | None,
-        method: Method,
-        constraints: Constraints | None,
-        guide: Guide | None,
-        interpolation: Interpolation | None,
-        memory_limit: int | None,
-        patches: Choice = "default",
-        spacing: Sequence[float] | None = None,
-    ) -> Request:
-        """Check the arguments of a call, and return them as a request."""
-        spacing = find_distances(spacing, exemplar, axes)
-        known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
-        region = Region.whole(as_size(size, axes=axes, way=LARGER[axes]), as_wrap(wrap, axes=axes, usual=False))
-        as_method(method, None, "paper", "paper-compensated")
-        if method is not None and (constraints is not None or guide is not None):
-            what = "constraints" if constraints is not None else "guide"
-            raise InvalidInput(f"{what}: cannot be combined with method={method!r}; omit one of them")
-        if bend_patches is not None and not isinstance(bend_patches, bool):
-            raise InvalidInput(f"bend_patches: must be True, False or None, got {bend_patches!r}")
-        chosen = check_plan(patches, method, as_quality(quality))
-        how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
-        turned = as_field(field, axes, region.shape, spacing)
-        if turned is not None:
-            turned = turned.over(region.shape)
-        check_region(known.pixels, region, turned, as_quality(quality), memory_limit)
-        conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
-        steps = None if spacing is None else as_distances(spacing, axes)
-        return cls(
-            known,
-            region,
-            turned,
-            as_seed(seed),
-            as_quality(quality),
-            bend_patches,
-            chosen,
-            method,
-            conditions,
-            how,
-            steps,
-        )
+    @tied
+    def distances(self) -> Sequence[float] | None:
+        """Voxel size along each axis, if it is given or if the exemplar's file states it."""
+        return find_distances(vars(self).get("spacing"), self.exemplar, self.axes)
+
+    @tied
+    def example(self) -> Exemplar:
+        """Analysed exemplar."""
+        return as_exemplar(self.exemplar, axes=self.axes, minimum=COARSEST)
+
+    @tied
+    def region(self) -> Region:
+        """Shape and periodic axes of the output."""
+        shape = as_size(self.size, axes=self.axes, way=LARGER[self.axes])
+        return Region.whole(shape, as_wrap(self.wrap, axes=self.axes, usual=False))
+
+    @tied
+    def plan(self) -> Choice:
+        """Method of stitching, and a check of the options that the printed algorithm does not have."""
+        if self.method is not None and (self.constraints is not None or self.guide is not None):
+            what = "constraints" if self.constraints is not None else "guide"
+            raise InvalidInput(f"{what}: cannot be combined with method={self.method!r}; omit one of them")
+        return check_plan(vars(self).get("patches", "default"), self.method, self.quality)
+
+    @tied
+    def sampling(self) -> Interpolation:
+        """Interpolation between the exemplar's samples in the final look-up."""
+        return as_interpolation(self.interpolation, self.example, "cubic" if self.method is None else "nearest")
+
+    @tied
+    def frames(self) -> Field | None:
+        """Frame field over the output. None leaves the texture as it is."""
+        field = as_field(self.field, self.axes, self.region.shape, self.distances)
+        return None if field is None else field.over(self.region.shape)
+
+    @tied
+    def conditions(self) -> Conditions:
+        """Constraints and guide, read after a check of the memory."""
+        check_region(self.example.pixels, self.region, self.frames, self.quality, self.memory_limit)
+        return Conditions.of(self.example.pixels, self.region.shape, self.constraints, self.guide)
+
+    @tied
+    def steps(self) -> tuple[float, ...] | None:
+        """Checked voxel size along each axis, or None."""
+        return None if self.distances is None else as_distances(self.distances, self.axes)
+
+
+@request
+class Solid(GrowthRequest):
+    """Parameters of `texrs.solid`.
+
+    - ``exemplar`` ((D, H, W) or (D, H, W, C) array, or Exemplar): Example volume, of any real dtype and number of
+      channels, at least 16 voxels a side. A `texrs.Exemplar` with ``axes=3`` states whether its values are labels, and
+      along which axes it is periodic; for other types, both are measured.
+    - ``size`` (int or (planes, rows, columns)): Size of the result in voxels. One number gives a cube.
+    - ``field`` (Field, str, array_like or path_like, optional): Field that rotates and scales the texture at each
+      voxel (`texrs.fields`). Python accepts a field or its words. Python also accepts directions (P, R, C, 3) or
+      frames (P, R, C, 3, 3) over the output, as an array or a file. None leaves the texture as it is.
+    - ``wrap`` (bool or (planes, rows, columns), optional): Axes along which the result is periodic. Default: none.
+    - ``constraints`` (Constraints, optional): Given voxels, specified by their values or by their source coordinates
+      (`texrs.Constraints`).
+    - ``spacing`` ((plane, row, column) float, optional): Voxel size along each axis of the exemplar and of the result,
+      in any unit. The field rotates and scales the texture in space, not in voxels, and its places and lengths are in
+      this unit. Default: the spacing that the exemplar's file states, else 1.
+    """
+
+    axes = 3
+    _: KW_ONLY
+    spacing: Word[Sequence[float] | None, Any] = Word(as_given, default=None, after="interpolation")
+
+
+@request
+class Synthesize(GrowthRequest):
+    """Parameters of `texrs.synthesize`.
+
+    - ``exemplar`` ((H, W) or (H, W, C) array, or Exemplar): Example image, of any real dtype and number of channels,
+      at least 16 pixels a side. A `texrs.Exemplar` states whether its values are labels, and along which axes it is
+      periodic; for other types, both are measured.
+    - ``size`` (int or (int, int)): Size of the result in pixels. One number gives a square.
+    - ``field`` (Field, str, array_like or path_like, optional): Field that rotates and scales the texture at each
+      pixel (`texrs.fields`). Python accepts a field or its words. Python also accepts directions (R, C, 2) or frames
+      (R, C, 2, 2) over the output, as an array or a file. None leaves the texture as it is.
+    - ``wrap`` (bool or (rows, columns), optional): Axes along which the result is periodic. Default: none.
+    - ``patches`` ({"auto", "default", "large", "unmasked", "unmasked-large"}): Method of stitching. "large": patches a
+      quarter larger than the default, which tear fewer elements but copy larger parts. "unmasked": seams may cross
+      elements. "unmasked-large": both. "auto": each method is tried twice on a small image and evaluated
+      (`texrs.metrics`), and a clearly better one replaces the default. The report key "candidates" contains the
+      measures of each. Default: patches of the usual size, and seams that avoid elements ("default").
+    - ``constraints`` (Constraints, optional): Given pixels, specified by their values or by their source coordinates
+      (`texrs.Constraints`).
+    """
+
+    axes = 2
+    _: KW_ONLY
+    patches: Word[Choice, Any] = Word(as_given, default="default", after="bend_patches")
 
 
 def as_field(
