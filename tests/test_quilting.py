@@ -138,16 +138,16 @@ def test_a_texture_smaller_than_a_patch_is_stitched_around(pebbles: np.ndarray, 
 
 @pytest.mark.parametrize("wrap", [(True, True), (True, False), (False, False)])
 @pytest.mark.parametrize("size", [(40, 41), (100, 130)])
-@pytest.mark.parametrize("kind", ["plain", "mirrored", "regular", "fixed", "waves"])
+@pytest.mark.parametrize("kind", ["plain", "mirrored", "regular", "striped", "fixed", "waves"])
 def test_it_is_that_of_the_slow_twin(
     monkeypatch: pytest.MonkeyPatch, wrap: tuple[bool, bool], size: tuple[int, int], kind: str
 ) -> None:
-    image = samples.bricks((96, 144)).image if kind == "regular" else samples.pebbles((96, 144)).image
+    image = (samples.bricks if kind in ("regular", "striped") else samples.pebbles)((96, 144)).image
     pictures, asked = [picture(image)], {"patch": 36, "overlap": 11, "wrap": wrap, "size": size}
     if kind == "mirrored":
         pictures.append(picture(image, mirrored=True))
-    elif kind == "regular":
-        lattice = np.array([[0.0, 12.0], [24.0, 12.0]])
+    elif kind in ("regular", "striped"):
+        lattice = np.array([[0.0, 12.0], [24.0, 12.0]] if kind == "regular" else [[12.0, 0.0], [0.0, 0.0]])
         pictures = [Picture(p.colours, p.source, p.depth, True, lattice) for p in pictures]
     elif kind == "fixed":
         asked |= {"fixed": 0, "size": (min(size[0], 60), size[1])}
@@ -231,3 +231,6 @@ def test_the_phase_of_a_shifted_image_is_its_shift():
     assert find_phase(first, first) == (0.0, 0.0)
     for shift in ((5, 7), (0, 13), (11, 0)):
         assert find_phase(first, picture(np.roll(image, shift, (0, 1)))) == pytest.approx(shift, abs=1.0)
+    lattice = np.array([[12.0, 0.0], [0.0, 0.0]])
+    stripes = np.repeat(image[:, 5:6], 96, axis=1)
+    assert find_phase(picture(stripes), picture(np.roll(stripes, 5, 0))) == pytest.approx((5, 0), abs=1.0)

@@ -162,7 +162,7 @@ def test_a_larger_result_is_laid_in_the_given_way(way):
 
 def test_ways_that_do_not_suit_the_image_or_the_size_are_errors():
     image = samples.pebbles((96, 96)).image
-    with pytest.raises(InvalidInput, match="lattice. is not possible: no lattice was found"):
+    with pytest.raises(InvalidInput, match="lattice. is not possible: no lattice or single period was found"):
         texrs.tile(image, size=200, way="lattice")
     for size in (None, 64):
         with pytest.raises(InvalidInput, match='way: must be "auto" for a result that is not larger'):

@@ -147,6 +147,10 @@ class Quilt:
             lattice = self.pictures[m.exemplar].lattice
             if lattice is not None and self.step is not None:
                 moved = self.measure_step(m, window) - self.step
+                if not lattice[:, 1].any():
+                    times = lattice[:, 0] @ moved / (lattice[:, 0] @ lattice[:, 0])
+                    away[k] = abs(times - np.rint(times))
+                    continue
                 around = np.floor(np.linalg.solve(lattice, moved))[:, np.newaxis] + [[0, 0, 1, 1], [0, 1, 0, 1]]
                 rest = np.linalg.norm(moved[:, np.newaxis] - lattice @ around, axis=0).min()
                 away[k] = rest / np.linalg.norm(lattice, axis=0).min()

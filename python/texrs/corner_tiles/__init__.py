@@ -114,7 +114,7 @@ class CornerTiles(InParts):
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown)
         if tile_size is None:
-            tile_size = choose_side(known.segment().lattice, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
+            tile_size = choose_side(known.segment().repeats, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
         if as_int(tile_size, "tile_size", 32, 1024) % 4:
             raise InvalidInput(f"tile_size: must be a multiple of 4, got {tile_size}")
         self._side, self._seed = tile_size, as_seed(seed)
@@ -134,7 +134,7 @@ class CornerTiles(InParts):
         costs = [np.asarray(KEEP * each.source_map.render(depth, interpolation="linear"), np.float32) for each in made]
         pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
-        step = find_step(list(pictures.images), known.segment().lattice, tile_size)
+        step = find_step(list(pictures.images), known.segment().repeats, tile_size)
         tiles = cut_tiles(pictures, tile_size, step, self._seed, advance or (lambda share: None))
         # Arrange the tiles on the torus, which contains each tile once, and store the position of each tile number.
         around = np.pad(TORUS, (0, 1), mode="wrap")

@@ -1,4 +1,4 @@
-"""Alignment of tiles with a lattice: if an exemplar repeats, all pieces are cut at equivalent positions."""
+"""Alignment of tiles with a lattice or stripes: if an exemplar repeats, all pieces are cut at equivalent positions."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array
+from texrs.exemplar.period import Period
 from texrs.exemplar.regularity import Lattice
 
 __all__ = ["Draw", "choose_side", "find_step"]
 
 SMALLER = 0.7
 """Minimum side of a tile that contains whole periods, as a share of the usual side."""
+HALF = 0.5
+"""Maximum deviation of a translation from a period, in pixels."""
 WHOLE = 0.01
 """Maximum deviation of the number of periods in a side from an integer."""
 
@@ -51,25 +54,35 @@ class Draw:
         return picture, row + int(shift[0]), column + int(shift[1])
 
 
-def choose_side(lattice: Lattice | None, usual: int) -> int:
-    """Return the side of a tile, a multiple of 4, that fits a lattice with the least change, or the usual side."""
-    if lattice is None:
+def choose_side(repeats: Lattice | Period | None, usual: int) -> int:
+    """Return the side of a tile, a multiple of 4, that fits whole periods with the least change, or the usual side."""
+    if repeats is None:
         return usual
     changes = []
     for side in range(usual, max(32, round(SMALLER * usual) // 4 * 4) - 1, -4):
-        closing = lattice.close((side, side), (True, True))
+        closing = repeats.close((side, side), (True, True))
         if closing is not None:
             changes.append((float(np.abs(closing - np.eye(2)).max()), -side))
     return -min(changes)[1] if changes else usual
 
 
-def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> Step | None:
+def find_step(images: Sequence[Array], repeats: Lattice | Period | None, side: int) -> Step | None:
     """Return equivalent positions in tileable images, or None if a tile does not contain whole periods."""
     size = (images[0].shape[0], images[0].shape[1])
-    closing = None if lattice is None else lattice.close(size, (True, True))
-    if lattice is None or closing is None:
+    closing = None if repeats is None else repeats.close(size, (True, True))
+    if repeats is None or closing is None:
         return None
-    vectors = closing @ lattice.vectors
+    vectors = closing @ repeats.vectors
+    shifts = (
+        _list_along(vectors[:, 0], size, side) if isinstance(repeats, Period) else _list_shifts(vectors, size, side)
+    )
+    return (
+        None if shifts is None else Step(shifts, np.stack([_find_phase(images[0], image, shifts) for image in images]))
+    )
+
+
+def _list_shifts(vectors: NDArray[np.float64], size: tuple[int, int], side: int) -> NDArray[np.intp] | None:
+    """Return the lattice translations within an image, or None if a tile does not contain whole periods."""
     turns = np.linalg.solve(vectors, np.diag(np.array(size, np.float64)))
     within = turns * side / np.array(size, np.float64)
     if np.abs(within - np.rint(within)).max() > WHOLE:
@@ -77,8 +90,18 @@ def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> St
     most = int(np.abs(np.rint(turns)).sum()) + 1
     steps = np.stack(np.meshgrid(*(np.arange(-most, most + 1),) * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     places = np.rint(steps @ vectors.T).astype(np.intp)
-    shifts = np.unique(places[((places >= 0) & (places < size)).all(axis=1)], axis=0)
-    return Step(shifts, np.stack([_find_phase(images[0], image, shifts) for image in images]))
+    return np.unique(places[((places >= 0) & (places < size)).all(axis=1)], axis=0)
+
+
+def _list_along(step: NDArray[np.float64], size: tuple[int, int], side: int) -> NDArray[np.intp] | None:
+    """Return the translations along and across stripes within an image, or None if a tile has no whole periods."""
+    length = np.sqrt(step[0] ** 2 + step[1] ** 2)
+    frequency = step / length**2
+    if np.abs(frequency * side - np.rint(frequency * side)).max() > WHOLE:
+        return None
+    phase = np.add.outer(*(np.arange(n) * f for n, f in zip(size, frequency, strict=True)))
+    # A translation by whole pixels deviates from the stripes by at most half a pixel.
+    return np.argwhere(np.abs(phase - np.rint(phase)) * length <= HALF)
 
 
 def _find_phase(first: Array, other: Array, shifts: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FRACTIONS", "close_vectors", "find_size"]
+from texrs._arrays import as_int, as_tuple, as_wrap
+
+__all__ = ["FRACTIONS", "check_size", "close_vectors", "find_size", "rate", "say_misfit"]
 
 STRETCHED, SHEARED, TURNED = 0.15, 0.04, 0.15
 """Maximum stretch, change of the right angle between the axes, and rotation that close a lattice.
@@ -28,6 +30,19 @@ FRACTIONS = 2.0**20
 Matrix = NDArray[np.float64]
 
 
+def check_size(size: Sequence[int], wrap: Sequence[bool]) -> tuple[tuple[int, int], tuple[bool, bool]]:
+    """Check the size of a texture and the axes along which it wraps."""
+    rows, columns = (as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns"))
+    down, across = as_wrap(wrap)
+    return (rows, columns), (down, across)
+
+
+def say_misfit(size: Sequence[int], other: tuple[int, int] | None) -> str:
+    """Return a sentence for reports: whole periods do not fit a size, but they fit another one."""
+    fits = f", but they fit {other[0]} rows and {other[1]} columns" if other else ", or sizes near them"
+    return f"whole periods of the exemplar do not fit {size[0]} rows and {size[1]} columns{fits}"
+
+
 def close_vectors(vectors: Matrix, size: Sequence[int], wrap: Sequence[bool]) -> Matrix | None:
     """Return the smallest change of an image that moves lattice translations onto the sides of a texture.
 
@@ -38,7 +53,7 @@ def close_vectors(vectors: Matrix, size: Sequence[int], wrap: Sequence[bool]) ->
         return np.eye(2)
     sides = np.array(size, np.float64)
     tried = _list_changes(_list_translations(vectors, sides, wrap), sides, wrap)
-    excess, total = _rate(tried)
+    excess, total = rate(tried)
     total[~(excess <= 1)] = np.inf
     best = int(np.argmin(total))
     # Add 0 to convert negative zeros.
@@ -53,7 +68,7 @@ def find_size(vectors: Matrix, size: Sequence[int], wrap: Sequence[bool]) -> tup
     exact[:, ~np.array(wrap)] = sides[~np.array(wrap)]
     # Prefer to change one side only.
     lengths = np.concatenate([np.where(kept, sides, exact) for kept in ((True, False), (False, True), (False, False))])
-    excess, total = _rate(_list_changes(np.tile(nearest, (3, 1, 1)), lengths, wrap))
+    excess, total = rate(_list_changes(np.tile(nearest, (3, 1, 1)), lengths, wrap))
     away = np.maximum(lengths / sides, sides / lengths).prod(axis=1)
     away[~(excess <= 1)] = np.inf
     best = int(np.lexsort((total, away))[0])
@@ -100,7 +115,7 @@ def _list_changes(pairs: Matrix, sides: Matrix, wrap: Sequence[bool]) -> Matrix:
     return np.moveaxis(np.array([[rows * d, -rows * b], [-columns * c, columns * a]]) / area, -1, 0)
 
 
-def _rate(changes: Matrix) -> tuple[Matrix, Matrix]:
+def rate(changes: Matrix) -> tuple[Matrix, Matrix]:
     """Return the largest of the stretches, shear and turn of each change in units of its limit, and the sum of squares."""
     (a, b), (c, d) = np.moveaxis(changes, 0, -1)
     # The singular values are half the sum and half the difference of these two.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.exemplar.closing import FRACTIONS
+from texrs.exemplar.period import confirm_lattice
 from texrs.exemplar.regularity import (
     REACH,
     WINDOW,
@@ -24,6 +25,7 @@ from texrs.exemplar.regularity import (
     crop_light,
     find_lattice,
     level_light,
+    list_places,
 )
 from texrs.exemplar.shapes import widen
 from texrs.kernels.gather import gather
@@ -116,7 +118,7 @@ def find_regularity(guide: Floats) -> tuple[Lattice | None, Courses | None]:
     """Find the lattice or the courses of an image. Elements in courses do not repeat, so there is never both."""
     lattice = find_lattice(guide)
     courses = find_courses(guide, lattice)
-    return None if courses else lattice, courses
+    return None if courses else confirm_lattice(guide, lattice), courses
 
 
 def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
@@ -220,10 +222,7 @@ def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
     correlation = widen(correlate(level_light(light), as_reach(light.shape, REACH), whole=True), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors
-    times = np.arange(-max(reach), max(reach) + 1) if min(reach) < 30 else np.arange(-30, 31)
-    steps = np.stack(np.meshgrid(times, times, indexing="ij"), axis=-1).reshape(-1, 2)
-    places = np.rint(steps @ vectors.T).astype(np.intp)
-    places = places[(np.abs(places) <= reach - 2).all(axis=1) & places.any(axis=1)] + reach
+    places = list_places(vectors, reach) + reach
     if not len(places):
         return False
     usual = correlation.mean(axis=1 - courses.axis)[places[:, courses.axis]]

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_tuple, as_wrap, hypot_single
+from texrs._arrays import as_float, hypot_single
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.exemplar.closing import FRACTIONS, close_vectors, find_size
+from texrs.exemplar.closing import FRACTIONS, check_size, close_vectors, find_size, say_misfit
 from texrs.exemplar.shapes import widen
 from texrs.source_map import SourceMap
 
@@ -74,6 +75,8 @@ OFTEN = 64
 
 Farther out, periods are fitted once per ring of peaks.
 """
+MULTIPLES = 30
+"""Maximum multiple of a lattice vector for comparing correlations, in images of at least this reach."""
 PARTS = 2.0**8
 """Number of steps per pixel for rounding periods. Results are then the same on every processor."""
 FARTHEST = 4096.0
@@ -253,22 +256,19 @@ class Lattice:
         --------
         >>> from texrs.exemplar import Lattice
         >>> Lattice((0, 40), (40, 0), 1.0).explain((60, 400), (True, True))
-        'whole periods of its lattice do not fit 60 rows and 400 columns, but they fit 80 rows and 400 columns'
+        'whole periods of the exemplar do not fit 60 rows and 400 columns, but they fit 80 rows and 400 columns'
 
         """
-        other = self.find_size(size, wrap)
-        fits = f", but they fit {other[0]} rows and {other[1]} columns" if other else ", or sizes near them"
-        return f"whole periods of its lattice do not fit {size[0]} rows and {size[1]} columns{fits}"
+        return say_misfit(size, self.find_size(size, wrap))
 
     def _check(
         self, size: tuple[int, int], wrap: tuple[bool, bool]
-    ) -> tuple[NDArray[np.float64], list[int], tuple[bool, ...]]:
+    ) -> tuple[NDArray[np.float64], tuple[int, int], tuple[bool, bool]]:
         """Return the vectors and the checked arguments of a search for a fitting size."""
-        lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
         vectors = self.vectors
         if vectors[0, 0] * vectors[1, 1] == vectors[0, 1] * vectors[1, 0]:
             raise InvalidInput(f"lattice: must have two vectors that are not parallel, got {self.a} and {self.b}")
-        return vectors, lengths, as_wrap(wrap)
+        return vectors, *check_size(size, wrap)
 
 
 def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
@@ -280,12 +280,10 @@ def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
 
 def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
     """Find the lattice of an image, by autocorrelation of its lightness or edges."""
-    if min(guide.shape[:2]) < 4 * SHORTEST:
+    found = [_search(picture, far) for picture in draw_views(guide)]
+    if not found:
         return None
-    light = crop_light(guide)
-    if light.std() < 1e-4:
-        return None
-    first, second = _search(light, far), _search(measure_edges(light), far)
+    first, second = found
     # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
     if first is None or (second is not None and second.correlation > CLEARER * first.correlation):
         return second
@@ -306,12 +304,27 @@ def _search(picture: Floats, far: bool) -> Lattice | None:
     return wide if wide is not None and (near is None or near.correlation < DOUBTED * wide.correlation) else near
 
 
-def measure_edges(light: Floats) -> Floats:
-    """Return the strength of the edges of an image, up to its 95 % quantile."""
+def draw_views(guide: Floats) -> Iterator[Floats]:
+    """Yield the lightness and the edges of an image, or nothing if it is too small or plain."""
     from scipy.ndimage import gaussian_filter
 
+    if min(guide.shape[:2]) < 4 * SHORTEST:
+        return
+    light = crop_light(guide)
+    if light.std() < 1e-4:
+        return
+    yield light
     edges = hypot_single(*np.gradient(gaussian_filter(light, 1.0)))
-    return np.minimum(edges, np.quantile(edges, 0.95))
+    yield np.minimum(edges, np.quantile(edges, 0.95))
+
+
+def list_places(vectors: NDArray[np.float64], reach: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the lattice translations within a reach, except the zero translation, rounded to pixels, (n, 2)."""
+    most = int(max(reach)) if min(reach) < MULTIPLES else MULTIPLES
+    times = np.arange(-most, most + 1)
+    steps = np.stack(np.meshgrid(times, times, indexing="ij"), axis=-1).reshape(-1, 2)
+    places = np.rint(steps @ vectors.T).astype(np.intp)
+    return places[(np.abs(places) <= reach - 2).all(axis=1) & places.any(axis=1)]
 
 
 def crop_light(guide: Floats) -> Floats:

@@ -34,6 +34,7 @@ from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.courses import Courses, find_regularity
 from texrs.exemplar.layers import Regions
+from texrs.exemplar.period import Period, find_period
 from texrs.exemplar.regularity import Lattice, scale_lattice
 from texrs.exemplar.shapes import mark_outlines
 
@@ -155,6 +156,9 @@ class Segmentation:
         Lattice of the exemplar, if any. None for elements marked by hand.
     courses : Courses, optional
         Courses of the exemplar, if any. The exemplar does not repeat along them, so `lattice` is None in this case.
+    period : Period, optional
+        Single period of an exemplar that repeats along one direction only, such as stripes. None if there is a lattice
+        or courses.
     layout : {"separate", "heap", "jointed", "net", "none"}, optional
         Layout of the elements (`texrs.exemplar.element_finder`). None if they are not components.
 
@@ -174,8 +178,14 @@ class Segmentation:
     lattice: Lattice | None = None
     courses: Courses | None = None
     layout: Arrangement | None = None
+    period: Period | None = None
 
     __repr__ = brief
+
+    @property
+    def repeats(self) -> Lattice | Period | None:
+        """The lattice or the single period that patches are kept in step with."""
+        return self.lattice or self.period
 
     @property
     def count(self) -> int:
@@ -295,15 +305,18 @@ def segment(
     with answering(watch):
         found = None if options.segmentation == "grid" else find_elements(guide)
         lattice, courses = find_regularity(guide) if found is None else (found.lattice, found.courses)
+        period = None if lattice or courses else find_period(guide)
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
     if found is not None:
         fault = find_fault(found)
         if options.segmentation == "components" or not fault:
             layers = (found.labels > 0).astype(np.int32)
-            return Segmentation(layers, found.labels, "components", "; ".join(reasons), lattice, courses, found.layout)
+            reason = "; ".join(reasons)
+            return Segmentation(layers, found.labels, "components", reason, lattice, courses, found.layout, period)
         reasons.insert(0, fault)
     cells = draw_cells(height, width)
-    return Segmentation((cells > 0).astype(np.int32), cells, "grid", "; ".join(reasons), lattice, courses)
+    layers = (cells > 0).astype(np.int32)
+    return Segmentation(layers, cells, "grid", "; ".join(reasons), lattice, courses, period=period)
 
 
 def shrink(parts: Segmentation, times: int) -> Segmentation:
@@ -323,6 +336,7 @@ def shrink(parts: Segmentation, times: int) -> Segmentation:
         elements=np.asarray(numbers.reshape(rows, columns) + first, np.int32),
         lattice=None if parts.lattice is None else scale_lattice(parts.lattice, 1 / times),
         courses=None if parts.courses is None else parts.courses.scale(1 / times),
+        period=None if parts.period is None else parts.period.scale(1 / times),
     ).freeze()
 
 

@@ -38,7 +38,10 @@ class Picture:
     regular: bool = False
     """True if the texture repeats on a lattice."""
     lattice: NDArray[np.float64] | None = None
-    """Lattice of the texture, (2, 2), with a translation (row, column) in each column; None without a lattice."""
+    """Lattice of the texture, (2, 2), with a translation (row, column) in each column; None without a lattice.
+
+    The second translation is 0 if the texture repeats along the first one only. It can be moved freely across it.
+    """
 
 
 def stitch(
@@ -123,7 +126,11 @@ def average_cells(colours: Floats, lattice: NDArray[np.float64]) -> NDArray[np.f
     rows, columns = np.indices(colours.shape[:2])
     # Invert the matrix by hand, because a linear solver is not the same on every processor.
     (a, b), (c, d) = np.asarray(lattice, float).tolist()
-    times = (d * rows - b * columns) / (a * d - b * c), (a * columns - c * rows) / (a * d - b * c)
+    if b == d == 0:
+        # The image has a single period. All points along its stripes are averaged.
+        times = (a * rows + c * columns) / (a * a + c * c), 0.0 * rows
+    else:
+        times = (d * rows - b * columns) / (a * d - b * c), (a * columns - c * rows) / (a * d - b * c)
     along = tuple(np.floor(FOLDED * each).astype(np.int64) % FOLDED for each in times)
     cell = np.ravel_multi_index(along, (FOLDED, FOLDED)).ravel()
     # A point that no pixel is nearest to gets the mean colour.

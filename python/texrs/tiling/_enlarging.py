@@ -17,6 +17,7 @@ from texrs._comparison_of_ways import choose, try_ways
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
+from texrs.exemplar.period import Period, confirm_lattice, find_period
 from texrs.exemplar.regularity import Lattice, bend, find_lattice
 from texrs.growth import stitch_image
 from texrs.kernels.gather import gather
@@ -51,13 +52,15 @@ def enlarge(
     if way != "auto":
         return lay(exemplar, way, size, wrap, watch), way, None
     own: Enlarging = "still" if obstacle else "lattice"
-    if own == "lattice" or min(exemplar.shape) < TRIED:
+    repeats = find_repeats(exemplar)
+    if (own == "lattice" and isinstance(repeats, Lattice)) or min(exemplar.shape) < TRIED:
         return lay(exemplar, own, size, wrap, watch), own, None
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
+    small = (repeats and repeats.find_size((side, side), (True, True))) or (side, side)
 
     def attempt(way: Enlarging) -> tuple[SourceMap, Array] | None:
         try:
-            source = lay(exemplar, way, (side, side), (True, True), lambda stage, share: watch("try", 0.0))
+            source = lay(exemplar, way, small, (True, True), lambda stage, share: watch("try", 0.0))
         except InvalidInput:
             # The cells are too few, or too large for a trial.
             return None
@@ -68,7 +71,8 @@ def enlarge(
     if parts.kind == "components" and parts.layout in ("jointed", "heap"):
         ways.append("cells")
     tried = exemplar.cached(
-        "enlarging", lambda: try_ways(exemplar, parts.measure_depth(DEEP), {way: partial(attempt, way) for way in ways})
+        ("enlarging", own),
+        lambda: try_ways(exemplar, parts.measure_depth(DEEP), {way: partial(attempt, way) for way in ways}),
     )
     best = choose(tried)
     try:
@@ -80,15 +84,19 @@ def enlarge(
 
 def find_obstacle(exemplar: Exemplar, size: tuple[int, int], wrap: tuple[bool, bool]) -> str:
     """Return the reason why a larger texture cannot be laid in step with a lattice, or an empty text."""
-    lattice = find_fine_lattice(exemplar)
-    if lattice is None:
-        return "no lattice was found in the image"
-    return lattice.explain(size, wrap) if lattice.close(size, wrap) is None else ""
+    repeats = find_repeats(exemplar)
+    if repeats is None:
+        return "no lattice or single period was found in the image"
+    return repeats.explain(size, wrap) if repeats.close(size, wrap) is None else ""
 
 
-def find_fine_lattice(exemplar: Exemplar) -> Lattice | None:
-    """Return the lattice of an image at its full size, because a fine lattice is not visible in a small copy."""
-    return exemplar.cached("fine lattice", lambda: find_lattice(exemplar.guidance))
+def find_repeats(exemplar: Exemplar) -> Lattice | Period | None:
+    """Return the lattice or single period of an image at its full size.
+
+    A fine lattice is not visible in a small copy.
+    """
+    colours = exemplar.guidance
+    return exemplar.cached("repeats", lambda: confirm_lattice(colours, find_lattice(colours)) or find_period(colours))
 
 
 def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequence[bool], watch: Progress) -> SourceMap:
@@ -116,7 +124,7 @@ def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequenc
 
 def close_lattice(exemplar: Exemplar, picture: Picture, size: tuple[int, int], wrap: tuple[bool, bool]) -> Picture:
     """Stretch an image so that whole periods of its lattice fit the result."""
-    lattice = find_fine_lattice(exemplar)
+    lattice = find_repeats(exemplar)
     closing = None if lattice is None else lattice.close(size, wrap)
     if lattice is None or closing is None:
         return picture

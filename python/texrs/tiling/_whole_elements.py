@@ -18,6 +18,8 @@ STEPS, ASLANT = 4, 0.08
 """
 STRICT = 0.45
 """Minimum autocorrelation of a strict lattice."""
+EVEN = 0.8
+"""Minimum agreement of the phases of strict stripes."""
 WHOLE = 0.2
 """Maximum difference between a length and a multiple of the period, in periods."""
 SMALLEST = 8
@@ -71,6 +73,11 @@ def find_whole_elements(colours: Floats) -> WholeElements:
     scale = len(colours) / len(parts.elements)
     lattice = None if parts.lattice is None else scale * parts.lattice.vectors
     strict = parts.lattice is not None and parts.lattice.correlation >= STRICT
+    if parts.period is not None:
+        along = parts.period.along()
+        # Along an axis with less than one period, the stripes hardly move.
+        lattice = scale * np.diag(np.where(along <= parts.elements.shape, along, 0.0))
+        strict = parts.period.agreement >= EVEN
     if parts.kind != "components":
         return replace(nothing, lattice=lattice, strict=strict)
     depth = parts.measure_depth(REACH)

@@ -145,7 +145,9 @@ def design(asked: Design) -> Synthesis:
           steps of tone at seams are ``stepped`` and ``blotched``. ``repetition`` and ``coverage`` are those
           of `texrs.metrics.evaluate`.
         - ``courses``: For each example, the courses that the texture is built from, or None.
-        - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its lattice to fit the size, or None.
+        - ``period``: For each example that repeats along one direction only, such as stripes, its period as (row, column)
+          in pixels, or None.
+        - ``lattice_stretch``: For each example, the (2, 2) matrix that stretches its periods to fit the size, or None.
         - ``rotate``: Largest permitted rotation of elements of the first example, in degrees.
         - ``pixel_counts``: Number of pixels from each example.
         - ``density``: For each scattered example, its densities (0 to 1) as ``asked``, as ``reached`` and in the
@@ -278,7 +280,7 @@ def make_texture(plans: Sequence[Plan], arguments: DesignRequest, seed: int) -> 
     image, seams = correct_colours(composite, picture, arguments)
     report = describe(plans, tiles, composite, seams, arguments, seed)
     if any(arguments.wrap):
-        found = check_result(image, None, arguments.wrap, regular=plans[0].parts.lattice is not None)
+        found = check_result(image, None, arguments.wrap, regular=plans[0].parts.repeats is not None)
         report["tiling"] = report_tiling(found, arguments.wrap)
     return Synthesis(image, composite, draw_stages(plans[0], tiles[0], picture), report)
 

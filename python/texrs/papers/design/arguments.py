@@ -78,12 +78,12 @@ class DesignRequest(Request):
       options.
     - ``way`` ({"auto", "move", "still", "lattice", "courses", "stitch", "cells", "sow"}): Way to lay the texture.
       "move" deforms elements, as in the paper. "still" leaves elements in place, and joins patches of the exemplar
-      and its mirror images on a grid. If the exemplar has a lattice or courses, it becomes "lattice" or "courses".
-      Patches are then in step with the lattice, or the texture is built course by course. "stitch" joins smaller
-      patches, each where it fits best. "cells" bends jointed cells or stones of a heap into a new arrangement.
-      "sow" places whole elements in a new arrangement on a grown background. "auto" tries the ways that the
-      exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is given, it is
-      "move". Default: "auto".
+      and its mirror images on a grid. If the exemplar has a lattice, stripes or courses, it becomes "lattice" or
+      "courses". Patches are then in step with the lattice or stripes, or the texture is built course by course.
+      "stitch" joins smaller patches, each where it fits best. "cells" bends jointed cells or stones of a heap into
+      a new arrangement. "sow" places whole elements in a new arrangement on a grown background. "auto" tries the
+      ways that the exemplar allows at a small size and uses the best one. If ``deformation`` or ``method`` is
+      given, it is "move". Default: "auto".
     - ``copies`` (int): Number of deformed copies of the exemplar that the result is stitched from, 1 to 64.
       Default: 4.
     - ``patch_size`` (int, optional): Side of the patches that fill holes, in pixels, from 4 to the exemplar's

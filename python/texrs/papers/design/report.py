@@ -66,6 +66,7 @@ def describe(
         "refused": [describe_obstacles(p, arguments) for p in plans],
         "candidates": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "courses": [describe_courses(p) for p in plans],
+        "period": [p.parts.period and [round(x, 4) for x in p.parts.period.step] for p in plans],
         "lattice_stretch": [describe_closing(p, arguments) for p in plans],
         "rotate": first.moves.rotate,
         "pixel_counts": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
@@ -84,10 +85,10 @@ def describe_obstacles(plan: Plan, arguments: DesignRequest) -> dict[str, str]:
 
 
 def describe_closing(plan: Plan, arguments: DesignRequest) -> list[list[float]] | None:
-    """Return the (2, 2) matrix that stretches an exemplar's lattice to fit a periodic texture, or None."""
+    """Return the (2, 2) matrix that stretches the periods of an exemplar to fit a periodic texture, or None."""
     closing = None
-    if plan.parts.lattice is not None and any(arguments.wrap):
-        closing = plan.parts.lattice.close(arguments.extent, arguments.wrap)
+    if plan.parts.repeats is not None and any(arguments.wrap):
+        closing = plan.parts.repeats.close(arguments.extent, arguments.wrap)
     return None if closing is None else [[round(float(x), 4) for x in row] for row in closing]
 
 

@@ -161,9 +161,9 @@ def try_way(
     if find_obstacle(plan, plan.way, (SIDE, SIDE), (False, False)):
         # The elements of a reduced exemplar can be too small.
         return None
-    lattice, size = plan.parts.lattice, (SIDE, SIDE)
-    if lattice is not None and lattice.close(size, (True, True)) is None:
-        size = lattice.find_size(size, (True, True)) or size
+    repeats, size = plan.parts.repeats, (SIDE, SIDE)
+    if repeats is not None and repeats.close(size, (True, True)) is None:
+        size = repeats.find_size(size, (True, True)) or size
     small = arguments.vary(
         side=plan.side,
         exemplars=[exemplar],

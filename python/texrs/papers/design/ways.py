@@ -2,8 +2,8 @@
 
 - "move": patches of copies whose elements moved, as in the paper (sections 3.1 and 3.3).
 - "still": patches of the unchanged exemplar and its mirror images, on a grid.
-- "lattice": the same for an exemplar on a lattice. Patches are in step with the lattice. It is stretched so that whole
-  periods fit a periodic texture. If this would change it too much, this way is refused.
+- "lattice": the same for an exemplar on a lattice, or with a single period, such as stripes. Patches are in step with
+  it. It is stretched so that whole periods fit a periodic texture. If this would change it too much, this way is refused.
 - "courses": patches of sheets that are built from the courses of the exemplar.
 - "stitch": patches of the unchanged exemplar, each where it fits best.
 - "cells": bent cells of the exemplar in a new arrangement of its cells, for jointed cells and heaps.
@@ -58,6 +58,9 @@ def list_ways(plan: Plan, size: tuple[int, int], wrap: tuple[bool, bool]) -> lis
         ways.remove("move")
     if plan.parts.lattice is not None and find_obstacle(plan, "lattice", size, wrap):
         ways.remove("sow")
+    elif plan.parts.period is not None:
+        # Patches on a grid that are not in step are not better.
+        ways.remove("lattice" if find_obstacle(plan, "lattice", size, wrap) else "still")
     elif plan.parts.lattice is not None and plan.parts.lattice.correlation >= STRICT:
         # The stitcher does not keep its patches in step with a lattice.
         ways = [way for way in ways if way in ("move", "lattice")]
@@ -72,10 +75,10 @@ def find_obstacle(plan: Plan, way: Way, size: tuple[int, int], wrap: tuple[bool,
     found = parts.kind in ("components", "labels")
     if way == "courses" and not parts.courses:
         return "no courses were found in the exemplar"
-    if way == "lattice" and parts.lattice is None:
-        return "no lattice was found in the exemplar"
-    if way == "lattice" and parts.lattice is not None and parts.lattice.close(size, wrap) is None:
-        return parts.lattice.explain(size, wrap)
+    if way == "lattice" and parts.repeats is None:
+        return "no lattice or single period was found in the exemplar"
+    if way == "lattice" and parts.repeats is not None and parts.repeats.close(size, wrap) is None:
+        return parts.repeats.explain(size, wrap)
     if way == "cells" and not (found and (parts.layout in ("jointed", "heap") or parts.kind == "labels")):
         return "neither jointed cells nor a heap of elements were found in the exemplar"
     if way == "sow" and not (found and plan.pure and classify(parts) == "apart"):
@@ -148,8 +151,8 @@ def lay_new_cells(number: int, plan: Plan, arguments: DesignRequest, seed: int) 
 
 
 def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: DesignRequest) -> list[Picture]:
-    """Return the tiles as sources of patches. A lattice is stretched so that whole periods fit a periodic texture."""
-    depth, lattice = measure_depth(plan), plan.parts.lattice
+    """Return the tiles as sources of patches. Whole periods are stretched to fit a periodic texture."""
+    depth, lattice = measure_depth(plan), plan.parts.repeats
     closing = None if lattice is None else lattice.close(arguments.extent, arguments.wrap)
     if closing is None:
         return [draw_picture(tile, depth) for tile in tiles]

@@ -41,7 +41,8 @@ pub struct Picture {
     pub colours: Vec<f32>,
     /// Number of rows and columns.
     pub shape: [usize; 2],
-    /// The lattice that the image repeats on, if the texture keeps it. Each column is a shift (row, column).
+    /// The lattice that the image repeats on, if the texture keeps it. Each column is a shift (row, column). The second
+    /// shift is 0 if the image repeats along the first one only.
     pub lattice: Option<[[f64; 2]; 2]>,
     /// Position in the image that corresponds to the origin of the first image, up to shifts of the lattice.
     pub phase: [f64; 2],

@@ -188,9 +188,14 @@ fn keep_in_step(
     }
 }
 
-/// Returns the distance of a step from the nearest lattice shift, in units of the lattice's shorter shift.
+/// Returns the distance of a step from the nearest lattice shift, in units of the lattice's shorter shift. If the second
+/// shift is 0, the image repeats along the first shift only, and all steps across it agree.
 fn out_of_step(lattice: &[[f64; 2]; 2], moved: [f64; 2]) -> f64 {
     let [[a, b], [c, d]] = *lattice;
+    if [b, d] == [0.0, 0.0] {
+        let times = (a * moved[0] + c * moved[1]) / (a * a + c * c);
+        return (times - times.round()).abs();
+    }
     let whole = a * d - b * c;
     let times = [
         (d * moved[0] - b * moved[1]) / whole,
@@ -224,5 +229,20 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
         b - (b - a) * (1.0 - part)
     } else {
         a + (b - a) * part
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::out_of_step;
+
+    #[test]
+    fn one_period_leaves_the_other_direction_free() {
+        let stripes = [[0.0, 0.0], [20.0, 0.0]];
+        for (moved, away) in [([7.0, 40.0], 0.0), ([-3.5, 5.0], 0.25), ([0.0, -10.0], 0.5)] {
+            assert!((out_of_step(&stripes, moved) - away).abs() < 1e-12);
+        }
+        let lattice = [[10.0, 0.0], [0.0, 20.0]];
+        assert!((out_of_step(&lattice, [3.0, 20.0]) - 0.3).abs() < 1e-12);
     }
 }
