@@ -21,14 +21,15 @@ import ast
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from textwrap import wrap
-from typing import Any, Generic, TypeVar, dataclass_transform, get_args, get_type_hints, overload
+from typing import Any, ClassVar, Generic, TypeVar, dataclass_transform, get_args, get_type_hints, overload
 
 from texrs._checks import as_bool, as_choice, as_float, as_int, as_method, as_seed, as_wrap
-from texrs._progress import listen
+from texrs._progress import answering, listen, stage
 from texrs._typing import Progress
 from texrs.errors import InvalidInput
 
@@ -112,11 +113,15 @@ class tied(cached_property[T]):
 class Request:
     """Arguments of a call, checked in the order of the fields, and then in the order of the `tied` methods."""
 
+    stage: ClassVar[str] = ""
+    """Name under which the progress of the `tied` methods is reported, if they take long."""
+
     def __post_init__(self) -> None:
         """Compute all values that depend on several parameters."""
-        for owner in reversed(type(self).__mro__):
-            for name, each in vars(owner).items():
-                if isinstance(each, tied):
+        stage(vars(self)["progress"] if self.stage else None, self.stage)
+        with answering(vars(self)["progress"], self.stage, 0.0) if self.stage else nullcontext():
+            for owner in reversed(type(self).__mro__):
+                for name in (name for name, each in vars(owner).items() if isinstance(each, tied)):
                     getattr(self, name)
 
     @property

@@ -41,112 +41,30 @@ Departures, with their reasons:
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from texrs._engine.pyramid import Region
-from texrs._progress import answering, listen, stage
-from texrs._typing import Array, Interpolation, Progress
-from texrs._verbs import takes_materials
-from texrs.exemplar import Exemplar
-from texrs.fields import Field
+from texrs._progress import answering, stage
+from texrs._verbs import verb
 from texrs.growth import FromSheet, stitch_sheet
-from texrs.materials import Material
 from texrs.papers.perspective.literal import average_windows
-from texrs.papers.perspective.request import Method, Request
-from texrs.papers.perspective.sizes import Sizes
+from texrs.papers.perspective.request import Perspective
 from texrs.papers.perspective.surfaces import PreparedExemplar, lay_out
-from texrs.planes import Plane
-from texrs.scale_maps import Measuring
-from texrs.scale_maps.kinds import Kind
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["perspective"]
 
 
-@takes_materials("exemplar")
-def perspective(
-    exemplar: Array | Exemplar | Material,
-    scale_map: Array | Plane | str = "auto",
-    size: int | Sequence[int] | None = None,
-    *,
-    target: Array | Plane | str | None = None,
-    target_green: Literal["up", "down"] = "up",
-    scale_kind: Kind | None = None,
-    fov: float | None = None,
-    direction: float | Array | Field | str | None = None,
-    scale_measurement: Measuring | None = None,
-    method: Method = None,
-    scale_weight: float = 1.0,
-    augment_scales: Sizes = "auto",
-    wrap: bool | Sequence[bool] | None = None,
-    seed: int = 0,
-    interpolation: Interpolation = "cubic",
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(Perspective, "exemplar")
+def perspective(asked: Perspective) -> Synthesis:
     """Synthesise an image whose elements have the sizes that a scale map gives.
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, or Exemplar
-        Example image, of any real dtype and number of channels, at least 16 pixels a side.
-    scale_map : (H, W) float array, Plane, "auto" or "front"
-        Size of the exemplar's elements at each pixel, above 0, in any unit (`texrs.scale_maps`). A `texrs.Plane`, or a
-        text such as ``"plane:slant=50,tilt=90,fov=60"``, gives the sizes on a plane. "auto" uses the plane that is
-        found in the image (`texrs.planes.find`), or else measures the sizes (`texrs.planes.measure_scale`). "front"
-        means that all elements have the same size. Default: "auto".
-    size : int or (int, int), optional
-        Size of the result in pixels. Default: the size of ``target``, or else twice the size of the exemplar.
-    target : array or Plane, optional
-        Requested size of elements at each pixel of the result, in the units of ``scale_map``. It is a scale map, or a
-        surface that the texture is placed on. A `texrs.Plane` or its text gives another plane, with elements of size 1
-        in its middle. Normals (rows, columns, 3) describe a curved surface, seen from far away. Coordinates (rows,
-        columns, 2) on a surface, or Jacobians (rows, columns, 2, 2), specify the step on the texture for a step of one
-        pixel (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`,
-        `texrs.Plane.jacobians`). A target of another size is resized so that its borders are the borders of the result
-        (`texrs.scale_maps.resample`). Default: ``scale_map``, resized.
-    target_green : {"up", "down"}
-        Direction of the y axis of normals in ``target``: up (OpenGL) or down (DirectX). Default: "up".
-    scale_kind : {"width", "area"}, optional
-        Quantity that a map contains, if the map does not state it (`texrs.scale_maps.ScaleMap`): "width" (widths
-        across the slope) or "area" (square roots of areas). The target has the same quantity. Default: the quantity
-        for which the scale map fits a plane best.
-    fov : float, optional
-        Angle of view of the longer side of the exemplar in degrees, 1 to 170. The foreshortening of a plane is
-        computed from this angle and the scale map. A ``target`` that is a surface uses it, and so does ``direction``.
-        Cannot be combined with a plane as ``scale_map``, which has its own angle. Default: 60 (`texrs.planes.FOV`).
-    direction : float, (rows, columns) array or Field, optional
-        Counter-clockwise rotation of the copied texture in degrees: one number, or one per pixel. Maps of another size
-        are resized. A `texrs.fields.Field` with two axes, or a text such as ``"circular"`` or
-        ``"zigzag:period=64,angle=30"``, gives the rotation of the field. On a plane or another surface, the texture
-        rotates within this surface. Default: 0.
-    scale_measurement : Measuring, optional
-        Options that measure the sizes for ``scale_map="auto"`` in a mask of features (`texrs.scale_maps.Measuring`).
-        Default: the sizes come from a plane in the image.
-    method : {None, "paper"}
-        Algorithm to use. "paper" is the algorithm as printed, for comparison. It averages windows and is slow,
-        supports at most four channels, and cannot wrap. Default: the algorithm with departures from the paper.
-    scale_weight : float
-        Weight of the requested scale compared with similarity to the exemplar, 0 to 16. It decides which resized
-        copies are used. Elements on a plane have the requested size with any weight above 0, but another sharpness. If
-        0, scales are ignored. Default: 1.
-    augment_scales : {"auto", True, False} or sequence of float
-        Resizing of the exemplar to all requested scales. True flattens a plane and renders it at any depth, and makes
-        copies of other exemplars in several sizes. "auto" does the same, but makes no copies if the exemplar has
-        enough of every requested scale. False replaces missing scales by the nearest existing ones, with a warning.
-        Numbers from 1/8 to 4 are the sizes of copies, and disable flattening. Default: "auto".
-    wrap : bool or (rows, columns), optional
-        Axes along which the result is periodic. The target must also be periodic along these axes. Default: none.
-    seed : int
-        Seed of the random choices, 0 to 2^64 - 1. The same seed gives the same bytes. Default: 0.
-    interpolation : {"nearest", "linear", "cubic"}
-        Interpolation between the exemplar's samples where it is resized. Default: "cubic".
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
-        the work stops. True shows a progress bar. Default: none.
+    {parameters}
 
     Returns
     -------
@@ -215,33 +133,13 @@ def perspective(
     ((96, 96, 3), True)
 
     """
-    progress = listen(progress)
-    stage(progress, "scale map")
-    with answering(progress, "scale map", 0.0):
-        asked = Request.check(
-            exemplar,
-            scale_map,
-            size,
-            target=target,
-            target_green=target_green,
-            scale_kind=scale_kind,
-            fov=fov,
-            direction=direction,
-            scale_measurement=scale_measurement,
-            method=method,
-            scale_weight=scale_weight,
-            augment_scales=augment_scales,
-            wrap=wrap,
-            seed=seed,
-            interpolation=interpolation,
-        )
     if asked.method == "paper":
-        return average_windows(asked, progress)
-    stage(progress, "sheet")
-    with answering(progress, "sheet", 0.0):
+        return average_windows(asked)
+    stage(asked.progress, "sheet")
+    with answering(asked.progress, "sheet", 0.0):
         # Prepare the exemplar: a flattened plane, or copies in several sizes.
         laid = lay_out(asked)
-    if laid.outside.share > 0 and asked.strength > 0:
+    if laid.outside.share > 0 and asked.scale_weight > 0:
         warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
     # Stitch patches of the sheet, each at the requested scale.
     found = stitch_sheet(
@@ -249,9 +147,9 @@ def perspective(
         Region.whole(laid.wanted.shape, asked.wrap),
         laid.target,
         frames=laid.frames,
-        strength=asked.strength,
+        strength=asked.scale_weight,
         seed=asked.seed,
-        progress=progress,
+        progress=asked.progress,
     )
     # Smooth reduced parts of the exemplar in the look-up, because they would alias otherwise.
     source = SourceMap.from_coordinates(
@@ -262,13 +160,13 @@ def perspective(
     return Synthesis(composite, source, stages, describe(asked, laid, found))
 
 
-def describe(asked: Request, laid: PreparedExemplar, found: FromSheet) -> dict[str, Any]:
+def describe(asked: Perspective, laid: PreparedExemplar, found: FromSheet) -> dict[str, Any]:
     """Return the report as JSON types."""
     elements = laid.sheet.elements
     return {
         "method": "default",
         "seed": asked.seed,
-        "scale_weight": asked.strength,
+        "scale_weight": asked.scale_weight,
         "measured": asked.describe_measured(),
         "sheet": laid.sheet.describe(),
         "surface": asked.surface is not None,

@@ -23,7 +23,7 @@ from texrs._typing import Array, Floats, Progress
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 from texrs.errors import InvalidInput
-from texrs.papers.perspective.request import Request
+from texrs.papers.perspective.request import Perspective
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -45,9 +45,9 @@ NEAREST = 1e-3
 Doubles = NDArray[np.float64]
 
 
-def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
+def average_windows(asked: Perspective) -> Synthesis:
     """Synthesise a texture by the paper's algorithm. Its stage ``before_blending`` copies each pixel's main source."""
-    image, target = asked.exemplar.pixels, asked.target
+    image, target = asked.exemplar.pixels, asked.wanted
     if any(asked.wrap):
         raise InvalidInput("wrap: cannot be combined with method='paper'")
     if image.shape[-1] > 4:
@@ -58,14 +58,14 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
             f"{image.shape[:2]} and a size of {target.shape}"
         )
     made, coordinates, energies = average(
-        image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress
+        image, asked.scale, target, weight=asked.scale_weight, seed=asked.seed, progress=asked.progress
     )
     source = SourceMap.from_coordinates(coordinates, image.shape[:2])
     composite = source.render(asked.exemplar.image, interpolation="nearest")
     report = {
         "method": "paper",
         "seed": asked.seed,
-        "scale_weight": asked.strength,
+        "scale_weight": asked.scale_weight,
         "measured": asked.describe_measured(),
         "energies": energies,
     }
