@@ -242,18 +242,22 @@ def _count_periods(frequency: Matrix, shape: tuple[int, ...]) -> float:
 
 def _list_peaks(level: Matrix) -> list[Matrix]:
     """Return the frequencies of the highest peaks of the spectrum, in periods per pixel."""
-    from scipy.fft import fft2
+    from scipy.fft import rfft2
     from scipy.ndimage import maximum_filter
 
     shape = level.shape
-    window = np.multiply.outer(*(np.hanning(n + 2)[1:-1] for n in shape))
-    spectrum = fft2(level * window)
+    down, across = (np.hanning(n + 2)[1:-1] for n in shape)
+    spectrum = rfft2(level * down[:, np.newaxis] * across)
+    # Frequencies from below zero to above zero, with one more on each side, which are only neighbours.
+    reach = [n // SHORTEST + 1 for n in shape]
+    rows, columns = (np.arange(-r, r + 1) / n for r, n in zip(reach, shape, strict=True))
+    spectrum = spectrum[np.arange(-reach[0], reach[0] + 1), : reach[1] + 1]
     power = spectrum.real**2 + spectrum.imag**2
-    rows, columns = (np.fft.fftfreq(n) for n in shape)
+    power = np.concatenate([power[::-1, :0:-1], power], axis=1)
     seen = np.add.outer(np.abs(rows) * shape[0], np.abs(columns) * shape[1])
     inside = (np.add.outer(rows**2, columns**2) < SHORTEST**-2) & (seen >= FEWEST)
     half = (rows[:, np.newaxis] > 0) | ((rows[:, np.newaxis] == 0) & (columns > 0))
-    peaks = np.argwhere((maximum_filter(power, 3, mode="wrap") == power) & inside & half)
+    peaks = np.argwhere((maximum_filter(power, 3) == power) & inside & half)
     order = np.argsort(-power[tuple(peaks.T)], kind="stable")[:PEAKS]
     return [np.array([rows[row], columns[column]]) for row, column in peaks[order]]
 

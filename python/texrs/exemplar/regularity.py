@@ -280,14 +280,15 @@ def scale_lattice(lattice: Lattice, factor: float) -> Lattice:
 
 def find_lattice(guide: Floats, *, far: bool = True) -> Lattice | None:
     """Find the lattice of an image, by autocorrelation of its lightness or edges."""
-    found = [_search(picture, far) for picture in draw_views(guide)]
-    if not found:
-        return None
-    first, second = found
-    # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
-    if first is None or (second is not None and second.correlation > CLEARER * first.correlation):
-        return second
-    return first
+    best: Lattice | None = None
+    for picture in draw_views(guide):
+        found = _search(picture, far)
+        # Prefer colours: edges distinguish places less well, because two similar edges can be half a period apart.
+        if best is None or (found is not None and found.correlation > CLEARER * best.correlation):
+            best = found
+        if best is not None and best.correlation * CLEARER >= 1:
+            break
+    return best
 
 
 def _search(picture: Floats, far: bool) -> Lattice | None:
@@ -297,7 +298,7 @@ def _search(picture: Floats, far: bool) -> Lattice | None:
     reaches = [as_reach(level.shape, share) for share in (REACH, FAR_REACH if far else REACH)]
     products = sum_products(level, reaches[1])
     near = _fit_lattice(correlate(level, reaches[0], whole=True, products=products), level.shape, REGULAR, 0.0)
-    if not far:
+    if not far or (near is not None and near.correlation >= DOUBTED):
         return near
     wide = _fit_lattice(correlate(level, reaches[1], products=products), level.shape, FAR_REGULAR, CHANCE)
     # Short vectors of a coarse lattice join similar parts of its cell.
@@ -315,7 +316,7 @@ def draw_views(guide: Floats) -> Iterator[Floats]:
         return
     yield light
     edges = hypot_single(*np.gradient(gaussian_filter(light, 1.0)))
-    yield np.minimum(edges, np.quantile(edges, 0.95))
+    yield np.minimum(edges, np.quantile(edges, 0.95), out=edges)
 
 
 def list_places(vectors: NDArray[np.float64], reach: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -425,12 +426,14 @@ def _fit_lattice(correlation: Floats, shape: tuple[int, ...], least: float, chan
     ``chance`` standard deviations of the correlation of scattered elements.
     """
     reach = np.array(correlation.shape) // 2
-    tolerant = widen(correlation, 2)
     away = np.argwhere(widen(correlation, 3) == correlation) - reach
     # Keep one shift of each two opposite ones.
     half = (away[:, 0] > 0) | ((away[:, 0] == 0) & (away[:, 1] > 0))
     away = away[half & ((away**2).sum(axis=1) > SHORTEST**2)]
     value = correlation[tuple((away + reach).T)]
+    if value.max(initial=0) < least:
+        return None
+    tolerant = widen(correlation, 2)
     vectors = away[np.lexsort((away[:, 1], away[:, 0], -value))[:PEAKS]]
     found: dict[tuple[Vector, Vector], tuple[float, int]] = {}
     for i, one in enumerate(vectors):
