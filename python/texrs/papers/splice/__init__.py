@@ -79,23 +79,19 @@ Departures from the paper, with their reasons:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
-from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size, check_work
-from texrs._progress import listen
-from texrs._typing import Array, Progress
-from texrs._verbs import takes_materials
+from texrs._verbs import verb
 from texrs.elements import ElementAnalysis, Layout
 from texrs.errors import InvalidInput
-from texrs.materials import Material
+from texrs.exemplar.cells import Cells
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
 from texrs.papers.splice.backward_warp import warp_backwards
 from texrs.papers.splice.cells import find_entry_cells, splice_cells
 from texrs.papers.splice.draft import draft_pixels
-from texrs.papers.splice.edit import as_steps
-from texrs.papers.splice.entry import as_elements
+from texrs.papers.splice.entry import SelfSplice, Splice
 from texrs.papers.splice.ground import lay_ground, survey
 from texrs.papers.splice.literal import fill_literally, match_literally
 from texrs.papers.splice.matching import (
@@ -117,85 +113,17 @@ from texrs.synthesis import Synthesis
 
 __all__ = ["self_splice", "splice"]
 
-Method: TypeAlias = Literal["paper", "preview"] | None
 NO_NET = "elements must have at least six knots that are at least 8 pixels apart; use a larger image, or another box"
 NO_CELLS = "no reliable cells were found; give texrs.elements.analyse a box around one cell, or a mask of the joints"
-SCREENING = 0.01
-"""Default weight of the original values in the colour correction.
-
-It evens out light that changes slowly.
-"""
-Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
-@takes_materials("elements", beside=("layout",), analysed=True)
-def splice(
-    elements: ElementAnalysis | Material | Array,
-    layout: ElementAnalysis | Material | Array,
-    size: int | Sequence[int] | None = None,
-    *,
-    seed: int = 0,
-    method: Method = None,
-    strength: float = 1.0,
-    layout_scale: float | None = None,
-    align: bool | None = None,
-    snap_rows: bool = False,
-    use_cells: bool | None = None,
-    use_nets: bool | None = None,
-    allow_rotation: bool | None = None,
-    refine: bool = True,
-    screening: float | None = SCREENING,
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(Splice, "elements", beside=("layout",), analysed=True)
+def splice(asked: Splice) -> Synthesis:
     """Arrange the elements of one texture like those of another.
 
     Parameters
     ----------
-    elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        Texture whose elements are used. An image is first analysed by `texrs.elements.analyse`.
-    layout : ElementAnalysis, or array
-        Texture or drawn layout (`texrs.layouts`) that determines the positions of the elements.
-    size : int or (rows, columns), optional
-        Size of the result, in pixels. Default: the size of the image of ``elements``.
-    seed : int
-        Seed of the patches that fill holes, and of the noise of the refinement, 0 to 2^64 - 1. Default: 0.
-    method : {None, "paper", "preview"}
-        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
-        triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
-        with departures from the paper.
-    strength : float
-        Fraction of the way that elements move, from their own layout (0) to the other layout (1). With 0, separate
-        elements stay in place, so the result at the texture's own size equals the texture. Default: 1.
-    layout_scale : float, optional
-        Scale of the layout, 0.01 to 100. With 1, a pixel of the layout is a pixel of the result, and the centres of
-        both images coincide. With 2, separate elements are half as dense along each axis. Elements that are too dense
-        are pushed apart. Default: the scale that fits the layout to the spacing or the size of the elements.
-    align : bool, optional
-        If True, the layout is rotated so that lines of its points agree with lines of the elements. This has no effect
-        on cells and nets. Default: True if ``layout_scale`` is not given.
-    snap_rows : bool
-        If True, target positions that are nearly in a row are moved onto one line. For example, the long joints of a
-        curved wall become straight. Default: False.
-    use_cells : bool, optional
-        If True, a connected texture is composed of its cells. If False, its figure is bent. Default: True if cells are
-        found.
-    use_nets : bool, optional
-        If True, a connected texture is composed of its knots and the lines between them, even if it has cells. If
-        False, its figure is bent. Default: True if the texture has no cells and a reliable layout of at least six
-        knots, and ``use_cells`` is not given.
-    allow_rotation : bool, optional
-        If True, cells may be rotated. Default: True, unless light or letters show which side of the texture is up.
-    refine : bool
-        If True, deformed pixels between rigid elements, or stretched pixels of cells, are refined. Nets, and separate
-        elements on their own background, are never refined. Default: True.
-    screening : float, optional
-        Weight of the original values when colours are corrected at the borders between elements and background, 0 to
-        1e6, see `texrs.blend`. This only affects separate elements on their background. A texture that is lit from one
-        side gives a result that is lit in the same way. None or 0: colours are not corrected, and the image is the
-        texture at the coordinates of the source map. Default: 0.01.
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
-        the work stops. True shows a progress bar. Default: none.
+    {parameters}
 
     Returns
     -------
@@ -275,144 +203,20 @@ def splice(
     ((128, 128, 3), True)
 
     """
-    progress = listen(progress)
-    as_method(method, None, "paper", "preview")
-    number, part, screening = as_seed(seed), as_float(strength, "strength", 0, 1), _as_screening(screening)
-    enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
-    turned = enlarged is None if align is None else as_bool(align, "align")
-    if enlarged is not None and method == "paper":
-        raise InvalidInput(
-            'layout_scale: cannot be combined with method="paper", which scales the layout to the spacing of the elements'
-        )
-    given = {"use_cells": use_cells, "use_nets": use_nets, "allow_rotation": allow_rotation}
-    wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
-    for name, either in (("refine", refine), ("snap_rows", snap_rows)):
-        if either is not None:
-            as_bool(either, name)
-    for name, asked in (("use_cells", wanted), ("use_nets", net)):
-        if asked and method is not None:
-            raise InvalidInput(
-                f'{name}: cannot be combined with method="{method}", which deforms connected textures instead'
-            )
-    if wanted and net:
-        raise InvalidInput(
-            "use_nets: cannot be combined with use_cells, because a texture is composed either of cells or of knots"
-        )
-    # Analyse the images only after all cheap checks of the arguments.
-    watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
-    mine, theirs = as_elements(elements, "elements", watch), as_elements(layout, "layout", watch)
-    rows, columns = shape or as_size(mine.mask.shape, minimum=16)
-    check_work("splice", [mine.image, theirs.image], (rows, columns))
-    if net and not has_knots(mine):
-        raise InvalidInput(
-            f"use_nets: {'elements must be a net, got separate elements' if mine.layout == Layout.DISJOINT else NO_NET}"
-        )
-    # Compose a connected texture of its cells, if it has any.
-    found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
-    if wanted and found is None:
-        raise InvalidInput(
-            f"use_cells: {'elements must have cells, got separate elements' if mine.layout == Layout.DISJOINT else NO_CELLS}"
-        )
-    if found is not None:
-        return splice_cells(
-            mine,
-            theirs,
-            found,
-            (rows, columns),
-            strength=part,
-            scale=enlarged,
-            turns=may_turn,
-            refine=bool(refine),
-            seed=number,
-            watch=watch,
-        )
-    # Compose a net of its knots, unless the caller chose another way.
-    if net or (net is None and wanted is None and method is None and is_net(mine)):
-        theirs_cells = find_entry_cells(theirs, watch)
-        return splice_nets(
-            mine, theirs, theirs_cells, (rows, columns), strength=part, scale=enlarged, seed=number, watch=watch
-        )
-    # Match elements with targets, and adjust the targets.
-    watch("match", 0.0)
-    if method == "paper":
-        match = match_literally(mine, theirs, (rows, columns), align=turned)
-    else:
-        match = match_layouts(mine, theirs, (rows, columns), align=turned, scale=enlarged)
-    if part < 1:
-        match = interpolate_layouts(mine, match, part)
-    match = replace(match, wanted=match.targets)
-    if method != "paper":
-        match = adjust_targets(mine, match, snap=bool(snap_rows), part=part < 1 or is_own(mine, theirs))
-    elif snap_rows:
-        match = straighten_rows(match)
-    if part < 1 and method is None and mine.layout == Layout.DISJOINT and mine.mask.shape == (rows, columns):
-        match = keep_cut(mine, match, part)
-    match = crop_extension(mine, match, (rows, columns))
-    watch("match", 1.0)
-    return _synthesize(
-        mine,
-        theirs,
-        match,
-        (rows, columns),
-        number,
-        method=method,
-        refine=bool(refine),
-        screening=screening,
-        watch=watch,
-    )
+    for find, make in PIPELINES:
+        found = find(asked)
+        if found is not None:
+            return make(asked, found)
+    raise AssertionError("the last pipeline suits all textures")
 
 
-@takes_materials("elements", analysed=True)
-def self_splice(
-    elements: ElementAnalysis | Material | Array,
-    edit: Edit | None = None,
-    size: int | Sequence[int] | None = None,
-    *,
-    seed: int = 0,
-    method: Method = None,
-    refine: bool = True,
-    screening: float | None = SCREENING,
-    progress: Progress | bool | None = None,
-) -> Synthesis:
+@verb(SelfSplice, "elements", analysed=True)
+def self_splice(asked: SelfSplice) -> Synthesis:
     """Rearrange the elements of one texture by editing their layout (Figure 9).
 
     Parameters
     ----------
-    elements : ElementAnalysis, or (H, W) or (H, W, C) array
-        Texture to edit. An image is first analysed by `texrs.elements.analyse`.
-    edit : str, mapping, or sequence of mappings, optional
-        Steps of the edit in order: scale, shift, rows, randomise, regularise, move, remove or points. Python accepts
-        plain JSON types. Steps change the layout, but not the size of elements.  ``{"op": "scale", "factor": 1.2}`` or
-        ``[1.2, 1]`` scales the layout, not the elements. ``{"op": "shift", "by": [4, 0]}`` moves all elements by rows
-        and columns, in pixels. ``{"op": "rows", "by": 6}`` moves every other row to the right and the other rows to
-        the left. ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` adds Gaussian displacements with a standard
-        deviation of 0.25 spacings. The minimum distance of elements is then 0.7 of the usual minimum. ``{"op":
-        "regularise", "amount": 1}`` moves elements onto the lattice that fits best. ``{"op": "move", "element": 3,
-        "by": [0, 8]}`` moves one element; ``"to"`` gives its new place instead. ``{"op": "remove", "element": 3}``
-        removes one element. ``{"op": "points", "points": [[row, column], ...]}`` lists new places. A name without
-        options is a step with its defaults. The report's "edit" lists the steps. Default: the layout is not changed.
-    size : int or (rows, columns), optional
-        Size of the result, in pixels, at least 16 along each axis. Before the edit, the texture is continued to a
-        larger size, or cropped to its middle. A larger result continues the texture's own layout, as in a splice with
-        itself. A smaller result is the middle of the texture. The steps use the element numbers of the report's
-        "elements", which lists their places before the steps. Default: the size of the image of ``elements``.
-    seed : int
-        Seed of random steps, elements that enter over a border, patches in holes, and the noise of the refinement, 0
-        to 2^64 - 1. Default: 0.
-    method : {None, "paper", "preview"}
-        Algorithm to use. "paper" is the algorithm as printed, with only its misprints repaired. "preview" draws
-        triangles between the moved elements, without keeping elements rigid or filling holes. Default: the algorithm
-        with departures from the paper.
-    refine : bool
-        If True, deformed pixels are refined. Only connected figures, and separate elements whose visible background is
-        too small, are deformed. Default: True.
-    screening : float, optional
-        Weight of the original values when colours are corrected where moved elements meet the background, 0 to 1e6, as
-        in `splice`. This only affects separate elements on their background. None or 0: colours are not corrected.
-        Default: 0.01.
-    progress : callable or True, optional
-        Function called as ``progress(stage, share)`` with the finished share of the stage. If it raises an exception,
-        the work stops. True shows a progress bar. Default: none.
+    {parameters}
 
     Returns
     -------
@@ -483,66 +287,92 @@ def self_splice(
     (128, 160, 3)
 
     """
-    progress = listen(progress)
-    as_method(method, None, "paper", "preview")
-    asked, number = None if size is None else as_size(size, minimum=16), as_seed(seed)
-    steps, screening = as_steps(() if edit is None else edit, number), _as_screening(screening)
-    watch = progress or (lambda stage, share: None)
-    mine = as_elements(elements, "elements", watch)
-    check_work("self_splice", [mine.image], asked or mine.mask.shape, "elements" if asked is None else "size")
+    mine, steps = asked.mine, asked.steps
     # If another size is requested, extend or crop the texture first, and then edit the result.
-    if asked is not None and asked != mine.mask.shape:
+    if asked.size is not None and asked.size != mine.mask.shape:
         rest: dict[str, Any] = {
-            "seed": number,
-            "method": method,
-            "refine": refine,
-            "screening": screening,
-            "progress": watch,
+            "seed": asked.seed,
+            "method": asked.method,
+            "refine": asked.refine,
+            "screening": asked.screening,
+            "progress": asked.watch,
         }
-        inside = all(n <= m for n, m in zip(asked, mine.mask.shape, strict=True))
-        resized = crop(mine, asked) if inside else splice(mine, mine, asked, align=False, **rest)
+        inside = all(n <= m for n, m in zip(asked.size, mine.mask.shape, strict=True))
+        resized = crop(mine, asked.size) if inside else splice(mine, mine, asked.size, align=False, **rest)
         entry = read_elements(mine, resized)
         edited = self_splice(check_resized(entry), steps, **rest) if steps else resized
         return report_resized(mine, entry, resized, edited, steps)
     # Rearrange separate elements on their background, and warp all other textures.
-    laid = rearrange(mine, steps, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
+    separate = asked.method is None and mine.layout == Layout.DISJOINT
+    laid = rearrange(mine, steps, asked.seed, asked.watch) if separate else None
     if laid is not None:
-        result = compose_edit(mine, laid, seed=number, screening=screening)
-        watch("done", 1.0)
+        result = compose_edit(mine, laid, seed=asked.seed, screening=asked.screening)
+        asked.watch("done", 1.0)
     else:
         moved = edit_layout(mine, steps)
-        result = _synthesize(
-            mine,
-            None,
-            match_edit(mine, moved),
-            (mine.mask.shape[0], mine.mask.shape[1]),
-            number,
-            method=method,
-            refine=bool(refine),
-            watch=watch,
-            listed=moved.listed,
-        )
+        size = (mine.mask.shape[0], mine.mask.shape[1])
+        result = deform(asked, None, match_edit(mine, moved), size, listed=moved.listed)
     return replace(result, report={**result.report, "edit": steps})
 
 
-def _as_screening(screening: object) -> float:
-    return as_float(0.0 if screening is None else screening, "screening", 0, 1e6)
+def find_cells(asked: Splice) -> Cells | None:
+    """Return the cells of a connected texture, if it has any and is composed of them."""
+    if asked.method is not None or asked.use_cells is False or asked.use_nets:
+        return None
+    found = find_entry_cells(asked.mine, asked.watch)
+    if asked.use_cells and found is None:
+        separate = asked.mine.layout == Layout.DISJOINT
+        raise InvalidInput(f"use_cells: {'elements must have cells, got separate elements' if separate else NO_CELLS}")
+    return found
 
 
-def _synthesize(
-    a: ElementAnalysis,
-    b: ElementAnalysis | None,
-    match: Match,
-    size: tuple[int, int],
-    seed: int,
-    *,
-    method: Method,
-    refine: bool,
-    watch: Progress,
-    screening: float = 0.0,
-    listed: bool = False,
+def find_net(asked: Splice) -> bool | None:
+    """Return True if a net is composed of its knots, and None for other textures."""
+    if asked.use_nets and not has_knots(asked.mine):
+        separate = asked.mine.layout == Layout.DISJOINT
+        raise InvalidInput(f"use_nets: {'elements must be a net, got separate elements' if separate else NO_NET}")
+    free = asked.use_nets is None and asked.use_cells is None and asked.method is None
+    return True if asked.use_nets or (free and is_net(asked.mine)) else None
+
+
+def find_match(asked: Splice) -> Match:
+    """Match elements with targets, and adjust the targets."""
+    mine, theirs, size, part = asked.mine, asked.theirs, asked.extent, asked.strength
+    asked.watch("match", 0.0)
+    if asked.method == "paper":
+        match = match_literally(mine, theirs, size, align=asked.turned)
+    else:
+        match = match_layouts(mine, theirs, size, align=asked.turned, scale=asked.layout_scale)
+    if part < 1:
+        match = interpolate_layouts(mine, match, part)
+    match = replace(match, wanted=match.targets)
+    if asked.method != "paper":
+        match = adjust_targets(mine, match, snap=asked.snap_rows, part=part < 1 or is_own(mine, theirs))
+    elif asked.snap_rows:
+        match = straighten_rows(match)
+    if part < 1 and asked.method is None and mine.layout == Layout.DISJOINT and mine.mask.shape == size:
+        match = keep_cut(mine, match, part)
+    match = crop_extension(mine, match, size)
+    asked.watch("match", 1.0)
+    return match
+
+
+PIPELINES: tuple[tuple[Callable[[Splice], Any], Callable[[Splice, Any], Synthesis]], ...] = (
+    (find_cells, splice_cells),
+    (find_net, lambda asked, found: splice_nets(asked, find_entry_cells(asked.theirs, asked.watch))),
+    (find_match, lambda asked, found: deform(asked, asked.theirs, found, asked.extent)),
+)
+"""Ways to compose a texture, each with a function that returns what it needs, or None if it does not suit.
+
+The first suitable way is used.
+"""
+
+
+def deform(
+    asked: Splice | SelfSplice, b: ElementAnalysis | None, match: Match, size: tuple[int, int], *, listed: bool = False
 ) -> Synthesis:
     """Deform the texture, draw it into the output, fill its holes and refine it (sections 4.2 and 4.3)."""
+    a, method, seed, watch = asked.mine, asked.method, asked.seed, asked.watch
     warp = warp_backwards(a, match, size, method=method, listed=listed, progress=watch)
     draft, label = draft_pixels(a, match, warp, whole=method is None)
     scene = survey(a) if b and method is None and a.layout == Layout.DISJOINT else None
@@ -556,9 +386,9 @@ def _synthesize(
     else:
         filled = fill(a.image, draft, spacing(a.points), seed, watch)
     places = filled.places
-    if refine and method != "preview" and laid is None:
+    if asked.refine and method != "preview" and laid is None:
         places = refine_places(a.image, a.wrap, filled, seed, watch)
-    weight = screening if laid is not None else 0.0
+    weight = asked.screening if laid is not None else 0.0
     light = scene.light if scene is not None else None
     result = compose(
         a, b, match, warp, draft, filled, places, label, method=method, seed=seed, screening=weight, light=light

@@ -43,6 +43,7 @@ from texrs.mosaic.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.cells.cell_drawings import draw_cell_stages
 from texrs.papers.splice.cells.refinement import refine_charts
 from texrs.papers.splice.cells.strength import interpolate_layouts, take_own_cells
+from texrs.papers.splice.entry import Splice
 from texrs.papers.splice.result import list_place, report_ways
 from texrs.papers.splice.texture_extension import lay_out
 from texrs.source_map import SourceMap
@@ -96,46 +97,8 @@ def is_heap(entry: ElementAnalysis) -> bool:
     return entry.known is not None and entry.report.get("found") == "heap"
 
 
-def splice_cells(
-    a: ElementAnalysis,
-    b: ElementAnalysis,
-    cells: Cells,
-    size: tuple[int, int],
-    *,
-    strength: float,
-    scale: float | None = None,
-    turns: bool | None,
-    refine: bool,
-    seed: int,
-    watch: Progress,
-) -> Synthesis:
+def splice_cells(asked: Splice, cells: Cells) -> Synthesis:
     """Synthesise a connected texture: place the cells of A in the tessellation of B.
-
-    Parameters
-    ----------
-    a, b : ElementAnalysis
-        The textures.
-    cells : Cells
-        Cells of A.
-    size : (rows, columns)
-        Size of the result, in pixels.
-    strength : float
-        Fraction of the way from A's own tessellation (0) to B's (1).
-    scale : float, optional
-        Scale of B's layout. Default: the scale that gives B's cells the size of A's cells.
-    turns : bool, optional
-        If True, cells may be rotated. Default: True, unless the image shows which side of A is up.
-    refine : bool
-        If True, stretched pixels are corrected.
-    seed : int
-        Seed of all random choices, and of the noise of the correction.
-    watch : callable
-        Function called as ``watch(stage, share)``.
-
-    Returns
-    -------
-    Synthesis
-        The result. Labels of its source map are targets, counted from 1 as in the report's "matches".
 
     Raises
     ------
@@ -143,16 +106,18 @@ def splice_cells(
         B has neither usable cells nor usable points.
 
     """
+    a, b, size, seed, watch = asked.mine, asked.theirs, asked.extent, asked.seed, asked.watch
+    strength, turns = asked.strength, asked.allow_rotation
     watch("cells", 0.0)
     may_turn = (True, True) in find_mirrors(guidance(as_image(a.image))) if turns is None else turns
-    wanted = _take_targets(b, size, cells.size, scale, seed)
+    wanted = _take_targets(b, size, cells.size, asked.layout_scale, seed)
     if strength < 1:
         wanted = interpolate_layouts(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     watch("cells", 0.2)
     # Choose a cell for each target, bend it to the target's shape, join the cells, and correct stretched pixels.
     charts, joined, places, frames = lay_cells(a.image, cells, wanted, turns=may_turn, seed=seed)
     watch("cells", 1.0)
-    if refine:
+    if asked.refine:
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
     source = SourceMap.from_coordinates(
         places, (a.mask.shape[0], a.mask.shape[1]), label=(joined.chart + 1).astype(np.uint32), jacobian=frames

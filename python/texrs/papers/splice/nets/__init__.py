@@ -34,6 +34,7 @@ from texrs.elements import ElementAnalysis, Layout
 from texrs.exemplar import Exemplar
 from texrs.exemplar.cells import Cells
 from texrs.growth.start import OVERLAP, weights_of
+from texrs.papers.splice.entry import Splice
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.knots import PlacedKnots, lay_knots
 from texrs.papers.splice.nets.net_drawings import draw_net_stages
@@ -74,41 +75,8 @@ def has_knots(entry: ElementAnalysis) -> bool:
     return entry.layout != Layout.DISJOINT and len(entry.points) >= FEWEST and spacing(entry.points) >= LEAST
 
 
-def splice_nets(
-    a: ElementAnalysis,
-    b: ElementAnalysis,
-    cells: Cells | None,
-    size: tuple[int, int],
-    *,
-    strength: float,
-    scale: float | None = None,
-    seed: int,
-    watch: Progress,
-) -> Synthesis:
-    """Synthesise a net: place the knots of A at the points of B.
-
-    Parameters
-    ----------
-    a, b : ElementAnalysis
-        The textures.
-    cells : Cells, optional
-        Cells of B. If given, their centres are used as B's points.
-    size : (rows, columns)
-        Size of the result, in pixels.
-    strength : float
-        Fraction of the way that knots move, from 0 (A's own places) to 1 (B's points).
-    scale : float, optional
-        Scale of B's layout. Default: the scale that gives it the spacing of A's knots.
-    seed : int
-        Seed of all random choices.
-    watch : callable
-        Function called as ``watch(stage, share)``.
-
-    Returns
-    -------
-    Synthesis
-        The result. Labels of its source map are targets, counted from 1 as in the report's "matches", and 0 for pixels
-        without a knot.
+def splice_nets(asked: Splice, cells: Cells | None) -> Synthesis:
+    """Synthesise a net: place the knots of A at the points of B, which are the centres of its cells, if it has any.
 
     Raises
     ------
@@ -116,10 +84,12 @@ def splice_nets(
         B has no usable points.
 
     """
+    a, b, size, seed, watch = asked.mine, asked.theirs, asked.extent, asked.seed, asked.watch
+    strength = asked.strength
     watch("nets", 0.0)
     unit = spacing(a.points)
     shape = (a.mask.shape[0], a.mask.shape[1])
-    wanted = take_points(a, b, cells, size, unit, scale=scale, seed=seed)
+    wanted = take_points(a, b, cells, size, unit, scale=asked.layout_scale, seed=seed)
     if strength < 1:
         wanted = interpolate_layouts(take_own_points(a, size, unit), wanted, strength)
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
