@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import texrs
 from reference import growth as reference
 from texrs import samples
 from texrs._arrays import guidance
@@ -13,7 +14,7 @@ from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, resampling_matrix
-from texrs.growth import FROM_ATLAS, Surroundings, from_draft, grow, grow_from_atlas
+from texrs.growth import FROM_ATLAS, Surroundings, from_draft, grow, grow_from_atlas, stitch_image
 from texrs.growth.constraints import Asked
 
 
@@ -146,3 +147,20 @@ def test_any_start_and_any_corrector_can_be_handed_in():
         {"shape": [7, 10], "passes": 1, "changed": 0.25},
         {"shape": [14, 20], "passes": 2, "changed": 0.25},
     ]
+
+
+@pytest.mark.parametrize("wrap", [True, False])
+@pytest.mark.parametrize("frequencies", [((1 / 26, 0), (0, 1 / 26)), ((0.02, 0.03),)], ids=["studs", "stripes"])
+def test_stitched_patches_are_in_step_with_a_lattice_or_stripes(frequencies, wrap):
+    rows, columns = np.indices((130, 140))
+    noise = np.random.default_rng(0).normal(0, 0.1, rows.shape)
+    light = 0.5 + 0.1 * (sum(np.cos(2 * np.pi * (a * rows + b * columns)) for a, b in frequencies) + noise)
+    exemplar = texrs.Exemplar(np.repeat(light[..., None], 3, axis=2).astype(np.float32))
+    assert exemplar.segment().repeats
+    coordinates, patches, frame = stitch_image(exemplar, (180, 190), (wrap, wrap), 0)
+    assert len(np.unique(patches)) > 2
+    assert wrap or (frame == np.eye(2)).all()
+    moved = coordinates - np.moveaxis(np.indices((180, 190)), 0, -1) @ frame.T
+    for each in frequencies:
+        away = moved @ np.array(each)
+        assert np.abs(away - np.rint(away)).max() < 0.15

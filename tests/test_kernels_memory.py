@@ -35,7 +35,7 @@ KERNELS = {
     "pyramid": "_rust.upsample(start, region, ((2 * side, 2 * side), (0, 0), (False, False)), still)",
     "jitter": "_rust.jitter(start, region, none, 4096, 1, 0)",
     "stitcher's source": "_rust.Stitcher(flat, (side, side), (False, False), numbers, depth, bytes_, no_costs)",
-    "stitcher": "source.stitch(half, still, patch, weights, (0.1, 4.0, 1.0), 1, none, no_places, none, None, None)",
+    "stitcher": "source.stitch(half, still, patch, weights, (0.1, 4.0, 1.0), 1, none, no_places, none, None, None, None)",
     "quilt": "_rust.quilt([(image, None, (0, 0))], pixels, patches_of, patched, begin, [], None)",
     "stitcher of samples": "_rust.PatchSamples(flat, np.zeros(side * side, np.float32), (0.1, 0.1))",
     "sparse": "_rust.Cholesky(*matrix, 1 << 32)",

@@ -279,6 +279,7 @@ class Stitcher:
         given: NDArray[int32],
         loose: NDArray[bool_],
         demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32], int] | None,
+        lattice: list[list[float]] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[int16], float, int]: ...
     def judge(

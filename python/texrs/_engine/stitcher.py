@@ -184,6 +184,7 @@ class Stitcher:
         given: NDArray[np.int32] | None = None,
         loose: NDArray[np.bool_] | None = None,
         demand: Demand | None = None,
+        lattice: NDArray[np.float64] | None = None,
         progress: Report | None = None,
     ) -> Stitched:
         """Fill a region with patches.
@@ -224,6 +225,9 @@ class Stitcher:
             True for fixed points that patches may still replace if this lowers the cost of seams.
         demand : Demand, optional
             Values that the points should have.
+        lattice : (2, 2) float64, optional
+            Lattice that patches are kept in step with, for images with one frame. The columns are translations of the
+            exemplar. The second is 0 if there is a single period.
         progress : callable, optional
             Function called with the completed share. An exception that it raises stops the work.
 
@@ -264,6 +268,7 @@ class Stitcher:
             np.zeros(0, np.int32) if given is None else given,
             flatten(loose),
             demand,
+            None if lattice is None else lattice.tolist(),
             progress,
         )
         return Stitched(places, patches, jacobians.reshape(-1, axes, axes), seams, healed)

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._engine.pyramid import ONE, Region, to_fixed
+from texrs._engine.pyramid import ONE, Region
 from texrs._engine.stitcher import Stitcher, Weights
 from texrs._progress import answering, stage
 from texrs._typing import Floats, Progress
@@ -58,6 +57,7 @@ def from_patches(
     bend: bool | None = None,
     larger: float = 1.0,
     plain: bool = False,
+    lattice: NDArray[np.float64] | None = None,
 ) -> Start:
     """Return a start that stitches patches along minimum cuts, which keeps elements whole.
 
@@ -78,6 +78,8 @@ def from_patches(
         Factor that multiplies the usual side of the patches. Default: 1.
     plain : bool
         If True, elements do not change the costs of seams.
+    lattice : (2, 2) float64, optional
+        Lattice of an image that patches are kept in step with, for outputs with one frame (`Stitcher.stitch`).
     """
     axes, side = exemplar.axes, larger * patch_side(exemplar.shape)
 
@@ -99,6 +101,7 @@ def from_patches(
             held=asked.held,
             given=asked.given,
             demand=asked.demand,
+            lattice=lattice,
             progress=stage(progress, "patches"),
         )
         # Give the fixed points a patch of their own, with an unrotated frame.
@@ -138,8 +141,11 @@ def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:
 
 def stitch_image(
     exemplar: Exemplar, size: Sequence[int], wrap: Sequence[bool], seed: int, progress: Progress | None = None
-) -> tuple[Floats, NDArray[np.uint32]]:
+) -> tuple[Floats, NDArray[np.uint32], Floats]:
     """Stitch an image of any size from unrotated patches of an exemplar.
+
+    Patches are in step with the exemplar's lattice or single period. They are stretched so that whole periods fit a
+    periodic result. If they do not fit, patches are placed freely and not stretched.
 
     Parameters
     ----------
@@ -160,10 +166,20 @@ def stitch_image(
         Position of each pixel in the exemplar, in pixels.
     patches : (rows, columns) uint32
         Patch of each pixel.
+    frame : (2, 2) float32
+        Jacobian of all patches.
 
     """
-    region = Region.whole(size, wrap)
-    grown = grow(region, 1, from_patches(exemplar, 0, seed), keep, partial(to_fixed, None), progress=progress)
+    region, frame, lattice = Region.whole(size, wrap), np.eye(2), None
+    repeats = exemplar.segment().repeats
+    closing = None if repeats is None else repeats.close((region.shape[0], region.shape[1]), (wrap[0], wrap[1]))
+    if repeats is not None and closing is not None:
+        (a, b), (c, d) = closing.tolist()
+        frame, lattice = np.array([[d, -b], [-c, a]]) / (a * d - b * c), repeats.vectors
+    frames = np.rint(ONE * frame[np.newaxis]).astype(np.int16)
+    start = from_patches(exemplar, 0, seed, lattice=lattice)
+    grown = grow(region, 1, start, keep, lambda here, spacing: frames, progress=progress)
     assert grown.patches is not None
     places = grown.places.reshape(*region.shape, 2) / np.float32(ONE)
-    return places.astype(np.float32, copy=False), grown.patches.labels.reshape(region.shape)
+    coordinates = places.astype(np.float32, copy=False)
+    return coordinates, grown.patches.labels.reshape(region.shape), np.asarray(frames[0] / ONE, np.float32)

@@ -103,8 +103,9 @@ def lay(exemplar: Exemplar, way: Enlarging, size: tuple[int, int], wrap: Sequenc
     """Return the source map of a periodic texture of any size in one way."""
     shape, colours = (exemplar.shape[0], exemplar.shape[1]), exemplar.guidance
     if way == "stitch":
-        coordinates, patches = stitch_image(exemplar, size, wrap, 0, watch)
-        return SourceMap.from_coordinates(coordinates, shape, label=patches)
+        coordinates, patches, frame = stitch_image(exemplar, size, wrap, 0, watch)
+        frames = np.broadcast_to(frame, (int(patches.max()) + 1, 2, 2)).copy()
+        return SourceMap.from_coordinates(coordinates, shape, label=patches, jacobian=frames)
     if way == "cells":
         turns = (True, True) in exemplar.mirror_symmetries
         laid = rearrange_cells(exemplar.segment().elements, colours, size, turns=turns, seed=0)

@@ -108,9 +108,13 @@ impl Stitcher {
         given: PyReadonlyArray1<'py, i32>,
         loose: PyReadonlyArray1<'py, bool>,
         demand: Option<GuideIn<'py>>,
+        lattice: Option<[[f64; 2]; 2]>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<StitchedOut<'py>> {
-        let options = options(patch, weights, charges, seed);
+        let options = Options {
+            lattice,
+            ..options(patch, weights, charges, seed)
+        };
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);
         let loose = loose.as_slice()?;
         let demand = slices(&demand)?;
@@ -339,6 +343,7 @@ fn options(patch: PatchIn, weights: [f32; 9], charges: [f32; 3], seed: u64) -> O
         continuation: charges[1],
         balance: charges[2],
         seed,
+        lattice: None,
     }
 }
 

@@ -5,6 +5,7 @@ pub(crate) mod fft;
 pub mod fixed;
 pub mod grid;
 pub mod hash;
+pub(crate) mod lattice;
 pub(crate) mod libm;
 pub(crate) mod memory;
 pub mod par;

@@ -62,7 +62,7 @@ def list_ways(plan: Plan, size: tuple[int, int], wrap: tuple[bool, bool]) -> lis
         # Patches on a grid that are not in step are not better.
         ways.remove("lattice" if find_obstacle(plan, "lattice", size, wrap) else "still")
     elif plan.parts.lattice is not None and plan.parts.lattice.correlation >= STRICT:
-        # The stitcher does not keep its patches in step with a lattice.
+        # Large patches keep a strict lattice as well as the stitcher does, and a trial takes time.
         ways = [way for way in ways if way in ("move", "lattice")]
     elif plan.parts.lattice is not None:
         ways = [way for way in ways if way in ("move", "lattice", "stitch", "cells")]
@@ -134,11 +134,11 @@ def quilt_tiles(
 
 def stitch_patches(number: int, arguments: DesignRequest, seed: int, watch: Callable[[float], object]) -> SourceMap:
     """Stitch patches of one exemplar, each from the place where it fits best. The patches are not mirrored."""
-    coordinates, patches = stitch_image(
+    coordinates, patches, frame = stitch_image(
         arguments.guides[number], arguments.extent, arguments.wrap, seed, lambda stage, share: watch(share)
     )
     exemplars = np.full(patches.shape, number, np.uint16)
-    frames = np.broadcast_to(np.eye(2, dtype=np.float32), (int(patches.max()) + 1, 2, 2)).copy()
+    frames = np.broadcast_to(frame, (int(patches.max()) + 1, 2, 2)).copy()
     return SourceMap(coordinates, exemplars, patches, frames, arguments.shapes)
 
 

@@ -1,6 +1,7 @@
 //! The penalties of matches, which are added to the costs of their misfit.
 
 use super::{CELL, Quilt, Window};
+use crate::foundation::lattice::out_of_step;
 use crate::kernels::patch_search::Match;
 
 /// Repetition penalty of a patch whose content all other patches also show, in units of the cost of a good match. Few
@@ -188,37 +189,6 @@ fn keep_in_step(
     }
 }
 
-/// Returns the distance of a step from the nearest lattice shift, in units of the lattice's shorter shift. If the second
-/// shift is 0, the image repeats along the first shift only, and all steps across it agree.
-fn out_of_step(lattice: &[[f64; 2]; 2], moved: [f64; 2]) -> f64 {
-    let [[a, b], [c, d]] = *lattice;
-    if [b, d] == [0.0, 0.0] {
-        let times = (a * moved[0] + c * moved[1]) / (a * a + c * c);
-        return (times - times.round()).abs();
-    }
-    let whole = a * d - b * c;
-    let times = [
-        (d * moved[0] - b * moved[1]) / whole,
-        (a * moved[1] - c * moved[0]) / whole,
-    ];
-    // The nearest lattice shift is one of the four around the step.
-    let mut rest = f64::INFINITY;
-    for [i, j] in [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]] {
-        let shift = [times[0].floor() + i, times[1].floor() + j];
-        let left = [
-            moved[0] - (a * shift[0] + b * shift[1]),
-            moved[1] - (c * shift[0] + d * shift[1]),
-        ];
-        rest = rest.min(norm(left));
-    }
-    rest / norm([a, c]).min(norm([b, d]))
-}
-
-/// Returns the length of a vector.
-fn norm([x, y]: [f64; 2]) -> f64 {
-    (x * x + y * y).sqrt()
-}
-
 /// Returns a quantile of sorted values, with linear interpolation as in NumPy.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = (sorted.len() - 1) as f64 * share;
@@ -229,20 +199,5 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
         b - (b - a) * (1.0 - part)
     } else {
         a + (b - a) * part
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::out_of_step;
-
-    #[test]
-    fn one_period_leaves_the_other_direction_free() {
-        let stripes = [[0.0, 0.0], [20.0, 0.0]];
-        for (moved, away) in [([7.0, 40.0], 0.0), ([-3.5, 5.0], 0.25), ([0.0, -10.0], 0.5)] {
-            assert!((out_of_step(&stripes, moved) - away).abs() < 1e-12);
-        }
-        let lattice = [[10.0, 0.0], [0.0, 20.0]];
-        assert!((out_of_step(&lattice, [3.0, 20.0]) - 0.3).abs() < 1e-12);
     }
 }

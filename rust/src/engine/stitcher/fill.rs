@@ -216,6 +216,7 @@ impl<const D: usize> Stitching<'_, D> {
             &self.canvas,
             &chart,
             known,
+            centre,
             self.cutter.guide,
             o.candidates,
             &self.noise.part(number),

@@ -49,7 +49,7 @@ use chart::Chart;
 pub use cover::{Prepared, Shown, cover, judge};
 use cut::{Cutter, LARGE};
 pub use flat::{Pasted, Pasting, Samples};
-use search::{Charges, Index};
+use search::{Charges, Index, Steps};
 pub use source::{Adjacency, Elements, Source};
 pub use weights::Weights;
 
@@ -79,6 +79,9 @@ pub struct Options {
     pub heal: bool,
     /// Seed of the random numbers. Each seed gives another texture.
     pub seed: u64,
+    /// Lattice that patches are kept in step with, for two axes and one frame. Each column is a shift of the exemplar.
+    /// The second is 0 if the exemplar repeats along the first one only.
+    pub lattice: Option<[[f64; 2]; 2]>,
 }
 
 /// Points that are given. There are none, or the arrays have one flag and one place for each point.
@@ -196,7 +199,8 @@ pub fn stitch<const D: usize>(
                 repetition: options.repetition,
                 continuation: options.continuation,
             },
-        ),
+        )
+        .in_step(Steps::new(options.lattice, frames)),
         balance: Balance::new(source, &canvas),
         canvas,
         patches: Vec::new(),
@@ -259,6 +263,9 @@ fn check<const D: usize>(
                 "must be from 4 to 4096 samples, overlap from 0 to 0.8, candidates from 1 to 64, and recover from 0 to 4; got {options:?}"
             ),
         ));
+    }
+    if options.lattice.is_some() && Steps::new(options.lattice, frames).is_none() {
+        return Err(Error::value("lattice", "needs two axes and one frame"));
     }
     options.weights.check()?;
     let charges = [options.repetition, options.continuation, options.balance];

@@ -44,6 +44,7 @@ const OPTIONS: Options = Options {
     recover: 0.5,
     heal: true,
     seed: 1,
+    lattice: None,
 };
 
 fn noise(seed: u64, n: usize) -> Vec<f32> {
@@ -87,7 +88,16 @@ fn the_best_place_is_that_of_a_slow_search() {
             let index = Index::new(&source, None, free);
             let covered = |&p: &u32| canvas.covered(p);
             let known: Vec<bool> = chart.window.points.iter().map(covered).collect();
-            let found = index.best(&source, &canvas, &chart, &known, None, 1, &Noise::new(0));
+            let found = index.best(
+                &source,
+                &canvas,
+                &chart,
+                &known,
+                [0; 2],
+                None,
+                1,
+                &Noise::new(0),
+            );
             let cost = |place: Place<2>| -> Option<f32> {
                 let mut sum = 0.0;
                 for (i, &p) in chart.window.points.iter().enumerate() {
@@ -153,7 +163,16 @@ fn a_large_exemplar_is_searched_as_exactly() {
         let chart = Chart::new(&canvas, frames, [20, 20], 31.0, false).unwrap();
         let covered = |&p: &u32| canvas.covered(p);
         let known: Vec<bool> = chart.window.points.iter().map(covered).collect();
-        let found = index.best(&source, &canvas, &chart, &known, None, 3, &Noise::new(0));
+        let found = index.best(
+            &source,
+            &canvas,
+            &chart,
+            &known,
+            [0; 2],
+            None,
+            3,
+            &Noise::new(0),
+        );
         assert_eq!(found[0], [721 * ONE, 353 * ONE]);
         assert_eq!(found.len(), 3);
     }

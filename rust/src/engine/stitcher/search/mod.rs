@@ -10,6 +10,7 @@
 mod exact;
 mod lattice;
 mod spectra;
+mod steps;
 
 use std::sync::Arc;
 
@@ -23,6 +24,7 @@ use crate::foundation::hash::Noise;
 
 use exact::Fit;
 use spectra::{Spectra, Template};
+pub(super) use steps::Steps;
 
 /// Minimum distance of two candidates, in samples.
 const APART: i32 = 3;
@@ -32,6 +34,12 @@ const NEAR: i32 = 6;
 const FEW: u32 = 12;
 /// Range of the random scores that are added if no point is known. For comparison, unrelated windows differ by 2.
 const CHANCE: f32 = 0.1;
+/// Maximum distance from a place in step with the lattice, in samples.
+const SLACK: f64 = 3.0;
+/// Cost of a place that is not in step. It is more than that of the exact continuation of a neighbour.
+const OUT_OF_STEP: f32 = 8.0;
+/// Number of random places that are tried for a place in step.
+const DRAWS: u32 = 256;
 /// Maximum ratio of the count of a sample to the mean count.
 const OFTEN: f32 = 6.0;
 /// Number of blocks whose surroundings are searched for candidates, as a multiple of the number of candidates.
@@ -53,6 +61,7 @@ pub(super) struct Index<const D: usize> {
     grid: Grid<D>,
     spectra: Arc<Spectra<D>>,
     charges: Charges,
+    steps: Option<Steps>,
     /// Number of patches that have shown the surroundings of each sample, weighted by distance.
     shown: Vec<f32>,
     total: f64,
@@ -79,6 +88,7 @@ impl<const D: usize> Index<D> {
             grid,
             spectra,
             charges,
+            steps: None,
             shown: vec![0.0; grid.len()],
             total: 0.0,
         }
@@ -87,6 +97,11 @@ impl<const D: usize> Index<D> {
     /// Returns an index of the same source without counts, and with other charges.
     pub(super) fn afresh(&self, charges: Charges) -> Self {
         Self::over(self.grid, Arc::clone(&self.spectra), charges)
+    }
+
+    /// Keeps places in step with a lattice.
+    pub(super) fn in_step(self, steps: Option<Steps>) -> Self {
+        Self { steps, ..self }
     }
 
     /// Counts a patch with a given side for the samples around its centre.
@@ -130,6 +145,7 @@ impl<const D: usize> Index<D> {
         canvas: &Canvas<D>,
         chart: &Chart<D>,
         known: &[bool],
+        at: [i32; D],
         guide: Option<&Guide<'_>>,
         count: usize,
         noise: &Noise,
@@ -149,9 +165,12 @@ impl<const D: usize> Index<D> {
         let (template, points) = self.splat_known(source, canvas, chart, known, first);
         let asked = guide.and_then(|guide| self.splat_asked(guide, chart, first));
         if points == 0 && asked.is_none() {
-            let draw = noise.below(blocks.len() as u64, [0x70, 0, 0, 0]);
-            let at = lattice.centre(blocks.point(draw as usize), first);
-            return vec![at.map(|x| x * ONE)];
+            let draw = |k| {
+                let block = noise.below(blocks.len() as u64, [0x70, k, 0, 0]);
+                lattice.centre(blocks.point(block as usize), first)
+            };
+            let tried = (0..DRAWS).map(draw).find(|c| self.astray(*c, at) == 0.0);
+            return vec![tried.unwrap_or_else(|| draw(0)).map(|x| x * ONE)];
         }
         let mut scores = self.spectra.scores(
             (points > 0).then(|| (&template, 1.0 / (points as f32 * source.channels() as f32))),
@@ -165,15 +184,18 @@ impl<const D: usize> Index<D> {
         }
         let continued = self.continuations(canvas, chart);
         if lattice.level == 0 {
-            let found = self.pick(&scores, &blocks, first, &continued, count);
+            let found = self.pick(&scores, &blocks, first, &continued, at, count);
             return found.into_iter().map(|c| c.map(|x| x * ONE)).collect();
         }
-        let near = self.pick(&scores, &blocks, first, &continued, BLOCKS * count);
+        let near = self.pick(&scores, &blocks, first, &continued, at, BLOCKS * count);
         let fit = Fit::new(source, canvas, chart, known, guide);
         let mut found: Vec<([i32; D], f32)> = near
             .into_iter()
             .map(|centre| fit.settle(centre, lattice.level, |at| range.bring(at, &self.grid)))
-            .map(|(centre, cost)| (centre, cost + self.charge(centre, &continued)))
+            .map(|(centre, cost)| {
+                let charge = self.charge(centre, &continued) + self.astray(centre, at);
+                (centre, cost + charge)
+            })
             .collect();
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
         self.part(found, count)
@@ -276,6 +298,15 @@ impl<const D: usize> Index<D> {
         self.charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
     }
 
+    /// Returns the cost of a sample that is not in step with the lattice, if the centre of its patch is at a point.
+    fn astray(&self, centre: [i32; D], at: [i32; D]) -> f32 {
+        let slack = SLACK + f64::from(1 << self.spectra.lattice.level) / 2.0;
+        match self.steps {
+            Some(steps) if steps.away(centre, at) > slack => OUT_OF_STEP,
+            _ => 0.0,
+        }
+    }
+
     /// Returns the part of a candidate's cost that does not depend on its fit.
     fn charge(&self, centre: [i32; D], continued: &[[i32; D]]) -> f32 {
         let goes_on = continued
@@ -305,6 +336,7 @@ impl<const D: usize> Index<D> {
         blocks: &Grid<D>,
         first: [i32; D],
         continued: &[[i32; D]],
+        at: [i32; D],
         count: usize,
     ) -> Vec<[i32; D]> {
         let lattice = &self.spectra.lattice;
@@ -312,14 +344,15 @@ impl<const D: usize> Index<D> {
         let mut values: Vec<f32> = blocks
             .points()
             .map(|block| {
-                scores[lattice.position(block)] + self.repetition(lattice.centre(block, first))
+                let centre = lattice.centre(block, first);
+                scores[lattice.position(block)] + self.repetition(centre) + self.astray(centre, at)
             })
             .collect();
         // Charge candidates that continue a neighbour exactly, and candidates within a few samples of them.
         if self.charges.continuation > 0.0 {
             for centre in continued {
-                let at = std::array::from_fn(|a| (centre[a] >> lattice.level) + first[a]);
-                self.around(blocks, at, wide(NEAR), |k| {
+                let near = std::array::from_fn(|a| (centre[a] >> lattice.level) + first[a]);
+                self.around(blocks, near, wide(NEAR), |k| {
                     values[k] += self.charges.continuation
                 });
             }
