@@ -76,8 +76,7 @@ def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None 
     count = math.prod(shape)
     most = find("voxels" if len(shape) == 3 else "pixels") if limit is None else limit
     if most is not None and count > most:
-        more = f"; {way}" if way else ""
-        raise LimitExceeded(f"{name}: {tuple(shape)} has {count} pixels, more than the limit of {most}{more}")
+        raise LimitExceeded(f"{name}: {tuple(shape)} has {count} pixels, more than the limit of {most}", remedy=way)
 
 
 def check_memory(needed: int, name: str = "size", *, limit: int | None = None, way: str = "") -> None:
@@ -93,9 +92,8 @@ def check_memory(needed: int, name: str = "size", *, limit: int | None = None, w
         return
     both = [most for most in (limit, find("memory")) if most is not None]
     if both and needed > min(both):
-        more = f"; {way}" if way else ""
         raise LimitExceeded(
-            f"{name}: needs {_spell(needed)} of memory, more than the limit of {_spell(min(both))}{more}"
+            f"{name}: needs {_spell(needed)} of memory, more than the limit of {_spell(min(both))}", remedy=way
         )
 
 

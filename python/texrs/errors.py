@@ -14,7 +14,30 @@ class TexrsError(Exception):
 
 
 class InvalidInput(TexrsError, ValueError):
-    """An argument is outside what the function allows."""
+    """An argument is outside what the function allows.
+
+    Parameters
+    ----------
+    text : str
+        Text of the form "argument: reason".
+    remedy : str
+        Advice for the caller, with which the message ends. Default: none.
+
+    Attributes
+    ----------
+    argument : str
+        Name of the argument, or names separated by commas.
+    reason : str
+        Values that are allowed, and the given value.
+    remedy : str
+        Advice for the caller, or an empty text.
+
+    """
+
+    def __init__(self, text: str, *, remedy: str = "") -> None:
+        super().__init__(f"{text}; {remedy}" if remedy else text)
+        argument, colon, reason = text.partition(":")
+        self.argument, self.reason, self.remedy = (argument, reason.strip(), remedy) if colon else ("", text, remedy)
 
 
 class LimitExceeded(InvalidInput):

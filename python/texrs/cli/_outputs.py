@@ -349,17 +349,16 @@ def name_arguments(**names: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
-        argument, colon, rest = str(error).partition(":")
-        several = argument.split(", ")
-        if not colon or not all(each.isidentifier() for each in several):
+        several = error.argument.split(", ")
+        if not all(each.isidentifier() for each in several):
             raise
         called = dict.fromkeys(names.get(each, as_flag(each)) for each in several)
-        said = say_places(rest) if set(several) & set(PLACED) else rest
+        said = say_places(error.reason) if set(several) & set(PLACED) else error.reason
         # Also replace other argument names in the text, but only names with an underscore, because others can be
         # ordinary words.
         for other in (name for name in names if "_" in name):
             said = re.sub(rf"\b{other}\b", names[other], said)
-        raise type(error)(f"{', '.join(called)}:{said}") from None
+        raise type(error)(f"{', '.join(called)}: {said}", remedy=error.remedy) from None
 
 
 PLACING = ("nrrd", "nii", "nii.gz")

@@ -106,10 +106,10 @@ class Verb:
             with collect() as notices, ask(palette):
                 self.make(count=count, quiet=quiet, variants=variants, notices=notices, **given)
         except LimitExceeded as error:
-            if not self.beyond or not str(error).startswith(("size:", "--size:")):
+            if not self.beyond or error.argument not in ("size", "--size"):
                 raise
-            # Drop the Python remedy, which does not help on the command line.
-            raise LimitExceeded(f"{str(error).partition('; texrs.')[0]}; {self.beyond}") from None
+            # Replace the Python remedy, which does not help on the command line.
+            raise LimitExceeded(f"{error.argument}: {error.reason}", remedy=self.beyond) from None
 
     def make(
         self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
