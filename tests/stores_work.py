@@ -54,9 +54,3 @@ def end_slowly(number: int) -> int:
     if number == 0:
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
-
-
-def end_late(number: int) -> int:
-    if number == 44:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number * number

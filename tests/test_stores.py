@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import texrs
-from stores_work import WEAVE, die, end, end_late, end_slowly, kill_once, outer, vary
+from stores_work import WEAVE, die, end, end_slowly, kill_once, outer, vary
 from texrs import fields, samples, stores
 from texrs._chunks import store as zarr_store
 from texrs._chunks import workers
@@ -416,13 +416,6 @@ def test_a_worker_that_is_to_stop_raises_only_in_its_task(monkeypatch: pytest.Mo
         )  # It would be reported, although nobody asked.
     assert left == [1]
     assert not workers._BUSY
-
-
-def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> None:
-    """A task that ends its workers is found among the tasks of its group."""
-    found = dict(workers.run(end_late, range(90), client, spare=True))
-    assert {n: r for n, r in found.items() if n != 44} == {n: n * n for n in range(90) if n != 44}
-    assert isinstance(found[44], stores.WorkerLost)
 
 
 def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker() -> None:

@@ -11,18 +11,18 @@ import sys
 import threading
 import time
 import warnings
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from texrs._cache import content_hash
 from texrs._checks import as_int
 from texrs._threads import threads
 from texrs.errors import InvalidInput, TexrsError
-from texrs.limits.active import context, said, set
+from texrs.limits.active import context, said
+from texrs.limits.active import set as set_limits
 
 __all__ = ["Scheduler", "WorkerLost", "run"]
 
@@ -32,15 +32,6 @@ Work = Callable[[int], Any]
 
 TRIES = 3
 """Number of workers that a task can end before the task is given up."""
-AHEAD = 2
-"""Number of tasks queued at each worker, including the running task, so that a worker need not wait for the next."""
-SHORT = 1.0
-"""Target duration of a batch of tasks on a cluster, in seconds.
-
-Short tasks are batched because each task costs the scheduler and its worker some milliseconds.
-"""
-MOST_AT_ONCE = 32
-"""Maximum number of tasks of a batch."""
 GRACE = 5.0
 """Time that a worker has to remove partial files before its process is ended, in seconds."""
 
@@ -115,12 +106,12 @@ _LEAVING = False
 
 
 def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
-    """Initialise a worker process: store its task, and watch for a stop message or the end of the parent process."""
+    """Initialise a worker process: store its task, and watch for the end of the work or of the parent process."""
     global _WORK, _THREADS
     # Ignore Ctrl-C, which reaches all processes of a terminal, because the parent process ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
-    set(**most)
+    set_limits(**most)
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
@@ -128,19 +119,16 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
 
 
 def _heed(stop: Any) -> None:
-    """End this process after a stop message, or if the parent process has died and can no longer end it."""
-    told = False
+    """End this process when the parent has closed its end of the pipe, or has died."""
     with suppress(EOFError, OSError):
         stop.recv_bytes()
-        told = True
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
     else:
         _thread.interrupt_main(signal.SIGTERM)
+    # Wait until the running task has removed its partial files.
     late = time.monotonic() + GRACE
-    # After a stop message, wait until the parent ends this process. If the parent has died, wait only until the
-    # running task has removed its partial files.
-    while time.monotonic() < late and (told or _BUSY):
+    while _BUSY and time.monotonic() < late:
         time.sleep(0.01)
     os._exit(1)
 
@@ -189,7 +177,7 @@ def _hold_interrupts() -> Iterator[None]:
 
 
 class _Process:
-    """A worker process and its queue of tasks, whose first task is running."""
+    """An executor of one process, which aborts its task when it is ended early."""
 
     def __init__(self, payload: bytes, count: int) -> None:
         # Spawn the process, because a forked process would inherit locks but not the threads that hold them.
@@ -198,78 +186,63 @@ class _Process:
         self._pool = ProcessPoolExecutor(
             1, mp_context=context, initializer=_begin, initargs=(payload, count, heard, said())
         )
-        self.tasks: dict[Future[Any], int] = {}
 
-    def submit(self, number: int) -> None:
-        """Append a task to the queue."""
-        with _hold_interrupts():
-            self.tasks[self._pool.submit(_do, number)] = number
+    def submit(self, number: int) -> Future[Any]:
+        """Start a task. A process that has ended gives a future with a `BrokenProcessPool`."""
+        try:
+            with _hold_interrupts():
+                return self._pool.submit(_do, number)
+        except BrokenProcessPool as error:
+            future = Future[Any]()
+            future.set_exception(error)
+            return future
 
     def end(self) -> None:
         """Ask the process to abort its task and end."""
-        if self.tasks:
-            with suppress(OSError):
-                self._stop.send_bytes(b"stop")
+        self._stop.close()
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def wait(self) -> None:
         """Wait until the process has ended."""
         self._pool.shutdown()
-        self._stop.close()
+
+
+def split(numbers: Sequence[int], count: int) -> list[deque[int]]:
+    """Divide tasks into rows of neighbours, which share cached results."""
+    return [deque(numbers[len(numbers) * i // count : len(numbers) * (i + 1) // count]) for i in range(count)]
 
 
 def _run_processes(
     work: Work, numbers: Sequence[int], count: int, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Run tasks in processes.
-
-    Each process runs a list of neighbouring tasks, then takes tasks from the end of the longest list.
-    """
-    payload = pack(work)
+    """Run tasks in processes. A process whose row is finished takes the last task of the longest row."""
+    payload, rows, tries = pack(work), split(numbers, count), Counter[int]()
     each = threads_each or max(1, (os.cpu_count() or 1) // count)
-    # Give each process a row of neighbouring tasks, which share cached results.
-    rows = [deque(numbers[len(numbers) * i // count : len(numbers) * (i + 1) // count]) for i in range(count)]
-    tries: dict[int, int] = {}
     processes = [_Process(payload, each) for _ in range(count)]
-
-    def feed(place: int) -> None:
-        while len(processes[place].tasks) < AHEAD:
-            # A process whose row is empty takes the last task of the longest row.
-            row = rows[place] or max(rows, key=len)
-            if not row:
-                return
-            number = row.popleft() if row is rows[place] else row.pop()
-            try:
-                processes[place].submit(number)
-            except BrokenProcessPool:
-                rows[place].appendleft(number)
-                if processes[place].tasks:
-                    return
-                processes[place] = _Process(payload, each)
-
+    running: dict[Future[Any], tuple[int, int]] = {}
+    idle = list(range(count))
     try:
-        for place in range(count):
-            feed(place)
-        while running := [future for one in processes for future in one.tasks]:
+        while True:
+            for place in idle:
+                if row := rows[place] or max(rows, key=len):
+                    number = row.popleft() if row is rows[place] else row.pop()
+                    running[processes[place].submit(number)] = place, number
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for place, one in enumerate(processes):
-                ready = [future for future in one.tasks if future in done]
-                for future in ready:
-                    if not isinstance(future.exception(), BrokenProcessPool):
-                        yield one.tasks.pop(future), future.result()
-                if any(future in one.tasks for future in ready):
-                    # Blame only the first task of the queue, because the others had not started.
-                    first, *others = one.tasks.values()
-                    one.tasks.clear()
-                    one.end()
-                    # Return the tasks to their row, and start another process.
-                    tries[first] = tries.get(first, 0) + 1
-                    lost = tries[first] == TRIES
-                    rows[place].extendleft(reversed(others if lost else [first, *others]))
-                    processes[place] = _Process(payload, each)
-                    if lost:
-                        yield first, _lose(first, spare)
-                feed(place)
+            if not done:
+                return
+            idle = [running[future][0] for future in done]
+            for future in done:
+                place, number = running.pop(future)
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    yield number, future.result()
+                    continue
+                processes[place].end()
+                processes[place] = _Process(payload, each)
+                tries[number] += 1
+                if tries[number] == TRIES:
+                    yield number, _lose(number, spare)
+                else:
+                    rows[place].appendleft(number)
     finally:
         for one in processes:
             one.end()
@@ -334,97 +307,48 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
 def _run_cluster(
     work: Work, numbers: Sequence[int], client: Any, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
-    """Run tasks on the workers of a cluster, and run the tasks of lost workers again."""
+    """Run tasks on the workers of a cluster, which runs the tasks of lost workers again."""
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
     payload = pack(work)
-    name = content_hash(payload, os.urandom(8)).hex()
     # Submit the function as a task instead of scattered data, because the cluster computes a task again for workers
     # that join later.
-    there = client.submit(pickle.loads, payload, key=f"texrs-work-{name}")
-    workers = list(client.nthreads().items())
-    if not workers:
+    there = client.submit(pickle.loads, payload, pure=False)
+    given = {"count": threads_each, "most": said(), "pure": False}
+    if not client.nthreads():
         client.wait_for_workers(1, timeout=60)
-        workers = list(client.nthreads().items())
-    # A slot is a thread of a worker. Each slot has a row of neighbouring tasks.
-    slots = [address for address, count in workers for _ in range(count)]
-    rows = [
-        deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
-    ]
-    # Map each submitted batch to its slot, its task numbers and ``alone``. A cluster blames all tasks that wait at a
-    # lost worker, so suspects are then run alone, with no other task submitted.
-    known: dict[Any, tuple[int, list[int], bool]] = {}
-    suspects: deque[tuple[int, int]] = deque()
-    waiting = [0] * len(slots)
-    at_once, most = 1, said()
-    queue = as_completed(loop=client.loop)
-
-    def take(slot: int) -> list[int]:
-        """Take a batch from the list of a slot, or from the longest list if its own list is empty."""
-        row = rows[slot] or max(rows, key=len)
-        return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
-
-    def submit(slot: int, some: list[int], alone: bool) -> None:
-        # Send the function together with a suspect task, so that any worker can run it. A cluster that has lost all
-        # workers waits for lost data, and never moves tasks of a lost worker to a new one.
-        future = client.submit(
-            _do_there,
-            payload if alone else there,
-            some,
-            threads_each,
-            most,
-            key=f"texrs-{name}-{some[0]}-{len(some)}{'-alone' * alone}",
-            workers=None if alone else [slots[slot]],
-            allow_other_workers=not alone,
-            pure=False,
-        )
-        known[future] = slot, some, alone
-        waiting[slot] += 1
-        queue.add(future)
-
-    def feed() -> None:
-        """Fill the queue of each slot. Tasks suspected of ending their workers are run first, one at a time."""
-        if not suspects:
-            for ahead in range(AHEAD):
-                for slot in range(len(slots)):
-                    if waiting[slot] == ahead and (some := take(slot)):
-                        submit(slot, some, False)
-        elif not known:
-            slot, number = suspects.popleft()
-            submit(slot, [number], True)
-
+    addresses, known, suspects = list(client.nthreads()), dict[Any, int](), list[int]()
+    for address, row in zip(addresses, split(numbers, len(addresses)), strict=True):
+        futures = client.map(_do_there, row, task=there, workers=[address], allow_other_workers=True, **given)
+        known |= zip(futures, row, strict=True)
     try:
-        feed()
-        for future in queue:
-            slot, some, alone = known.pop(future)
-            waiting[slot] -= 1
+        for future in as_completed(known, loop=client.loop):
             try:
-                results, seconds = future.result()
-                # Choose the batch size so that a batch takes about SHORT seconds.
-                at_once = max(1, min(MOST_AT_ONCE, int(len(some) * SHORT / max(seconds, 1e-6))))
+                yield known[future], future.result()
+            except KilledWorker:
+                suspects.append(known[future])
+            # Let the cluster forget the result.
+            del known[future]
+        # A cluster blames all tasks that wait at a lost worker, so run them again, each alone.
+        for number in suspects:
+            future = client.submit(_do_there, number, task=payload, **given)
+            known[future] = number
+            try:
+                yield number, future.result()
             except KilledWorker as error:
-                # If the task was run alone, it is to blame for the loss of its worker. Otherwise all tasks of the
-                # batch are suspects.
-                if not alone:
-                    suspects.extend((slot, number) for number in some)
-                    some = []
-                results = [WorkerLost(f"task {number}: {error}") for number in some]
-                if results and not spare:
-                    raise results[0] from None
-            feed()
-            yield from zip(some, results, strict=True)
+                lost = WorkerLost(f"task {number}: {error}")
+                if not spare:
+                    raise lost from None
+                yield number, lost
     finally:
         client.cancel([there, *known])
 
 
-def _do_there(
-    task: Work | bytes, some: Sequence[int], count: int | None, most: dict[str, Any]
-) -> tuple[list[Any], float]:
-    """Run tasks within the limits of the caller. Return their results and the duration in seconds."""
+def _do_there(number: int, *, task: Work | bytes, count: int | None, most: dict[str, Any]) -> Any:
+    """Run a task within the limits of the caller."""
     from distributed import get_worker
 
-    begun = time.monotonic()
     work = pickle.loads(task) if isinstance(task, bytes) else task
     with context(**most), threads(count or max(1, get_worker().state.nthreads)):
-        return [work(number) for number in some], time.monotonic() - begun
+        return work(number)
