@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import texrs
 from texrs import elements, samples
-from texrs.errors import InvalidInput
+from texrs.errors import InputWarning, InvalidInput
 from texrs.exemplar.element_finder import FoundElements, _finder, find_elements
 from texrs.exemplar.element_finder._candidates import Candidates, make_leaves, measure
 from texrs.exemplar.element_finder._contour_strength import find_contours
@@ -241,3 +241,47 @@ def test_elements_of_clear_textures_are_surer() -> None:
     means = [np.mean([element.confidence for element in found.elements]) for found in (clear, vague)]
     assert means[0] > 0.8
     assert means[0] > means[1] + 0.2
+
+
+def test_strokes_part_fused_elements_and_add_missed_ones():
+    image, truth = samples.pebbles((96, 104)).image, samples.pebbles((96, 104)).labels
+    found = find_elements(image)
+    numbers = np.flatnonzero(np.bincount(truth.ravel()) > 60)[1:]
+    missed = [
+        i for i in numbers if max(np.bincount(found.labels[truth == i])[1:], default=0) < 0.5 * (truth == i).sum()
+    ]
+    marks = np.zeros(truth.shape, int)
+    for i in missed or numbers[:3]:
+        rows, columns = np.nonzero(truth == i)
+        middle = rows == round(rows.mean())
+        marks[rows[middle], columns[middle]] = i
+    again = find_elements(image, marks=marks)
+    held = [np.bincount(again.labels[marks == i]).argmax() for i in np.unique(marks[marks > 0])]
+    assert 0 not in held
+    assert len(set(held)) == len(held)
+    assert rate(again, truth)[0] >= rate(found, truth)[0]
+
+
+def test_one_element_with_two_marks_becomes_two():
+    image = samples.dots((128, 128)).image
+    found = find_elements(image)
+    number = int(np.argmax([element.area for element in found.elements])) + 1
+    rows, columns = np.nonzero(found.labels == number)
+    marks = np.zeros(found.labels.shape, int)
+    marks[rows[:9], columns[:9]], marks[rows[-9:], columns[-9:]] = 1, 2
+    again = find_elements(image, marks=marks).labels
+    first, second = (np.bincount(again[marks == i]).argmax() for i in (1, 2))
+    assert first != second
+    assert min(first, second) > 0
+
+
+def test_marks_that_find_nothing_are_reported():
+    plain = np.full((64, 64, 3), 90, np.uint8)
+    with pytest.warns(InputWarning, match="marks: nothing was found"):
+        find_elements(plain, marks=np.eye(64, dtype=int))
+
+
+@pytest.mark.parametrize("marks", [np.zeros((3, 3), int), np.full((64, 64), -2), np.zeros((64, 64)), 7])
+def test_unsuitable_marks_are_refused(marks):
+    with pytest.raises(InvalidInput, match="marks"):
+        find_elements(samples.dots((64, 64)).image, marks=marks)

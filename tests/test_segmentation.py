@@ -10,7 +10,7 @@ from texrs import samples
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, segment
-from texrs.exemplar.regularity import Lattice, find_lattice, measure_direction, measure_polarity
+from texrs.exemplar.regularity import Lattice, correlate, find_lattice, measure_direction, measure_polarity
 from texrs.exemplar.shapes import Shapes, measure_solidity
 
 
@@ -179,6 +179,17 @@ def test_the_same_bytes_for_any_number_of_threads():
 
 
 # --- regularity ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_shifts_beyond_an_image_do_not_correlate(whole: bool):
+    picture = np.random.default_rng(0).standard_normal((20, 40)).astype(np.float32)
+    found = correlate(picture, (30, 50), whole=whole)
+    assert found.shape == (61, 101)
+    assert not found[:11].any()
+    assert not found[:, -11:].any()
+    assert found[30, 50] == pytest.approx(1)
+    assert np.array_equal(found, found[::-1, ::-1])
 
 
 def is_in(vector, found):

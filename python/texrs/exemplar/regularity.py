@@ -367,7 +367,7 @@ def correlate(
         scale *= max(float(np.square(picture, dtype=np.float64).sum()), 1e-12 * picture.size)
     else:
         scale = _measure_deviations(picture, reach[0], columns)
-    half = np.divide(found, scale, out=scale).astype(np.float32)
+    half = np.divide(found, np.maximum(scale, 1e-12, out=scale), out=scale).astype(np.float32)
     half[measure_overlap(picture.shape, rows, columns) < OVERLAP] = 0
     return np.concatenate([half[:0:-1, ::-1], half])
 
@@ -379,8 +379,11 @@ def _measure_deviations(picture: Floats, reach: int, columns: NDArray[np.intp]) 
     np.square(picture, out=sums[1:, 1:], dtype=np.float64)
     for axis in range(2):
         np.cumsum(sums, axis, out=sums)
+    # Shifts beyond the image leave empty parts.
+    rows = np.minimum(np.arange(reach + 1), len(picture))
+    columns = np.clip(columns, -picture.shape[1], picture.shape[1])
     left, right = np.maximum(columns, 0), np.minimum(columns, 0) + picture.shape[1]
-    lower, upper = sums[-1] - sums[: reach + 1], sums[::-1][: reach + 1]
+    lower, upper = sums[-1] - sums[rows], sums[len(picture) - rows]
     # The part that a shift moves onto another one is the other part of the opposite shift.
     product: NDArray[np.float64] = lower[:, right]
     other = upper[:, right[::-1]]
@@ -415,7 +418,7 @@ def sum_products(picture: Floats, reach: tuple[int, int]) -> NDArray[np.float64]
 
 def measure_overlap(shape: tuple[int, ...], rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the shares of an image that overlap its copies, shifted by numbers of rows and columns."""
-    down, across = (1 - np.abs(shifts) / n for shifts, n in zip((rows, columns), shape[:2], strict=True))
+    down, across = (np.maximum(1 - np.abs(shifts) / n, 0) for shifts, n in zip((rows, columns), shape[:2], strict=True))
     return np.outer(down, across)
 
 

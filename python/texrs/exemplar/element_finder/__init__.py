@@ -6,8 +6,9 @@
 4. *Quality*: each candidate is rated by its outline and its shape.
 5. *Choice*: the best disjoint set of candidates, among several usual sizes and readings of lines.
 6. *Consensus*: the chosen candidates support those that look like them, and the choice is made again.
-7. *Outlines*: minimum cuts in bands around the first outlines, at the full size.
-8. *Layout*: from the contact of elements and the gaps between them. For heaps, the overlaps are also found.
+7. *Marks*: elements that are known by strokes are kept, or grow from them.
+8. *Outlines*: minimum cuts in bands around the first outlines, at the full size.
+9. *Layout*: from the contact of elements and the gaps between them. For heaps, the overlaps are also found.
 """
 
 from __future__ import annotations

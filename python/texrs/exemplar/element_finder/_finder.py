@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from texrs._arrays import as_image, as_rgb, as_seed, guidance
+from texrs._arrays import as_array, as_image, as_rgb, as_seed, guidance
 from texrs._cache import Cache, content_hash
 from texrs._checks import as_int
+from texrs._notices import ignore
 from texrs._progress import answering, ask, listen
 from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.errors import InvalidInput
@@ -177,7 +178,9 @@ _FOUND: Cache[bytes, FoundElements] = Cache(1 << 26, lambda found: found.labels.
 """Recent results, by the colours of the image and the seed."""
 
 
-def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | None = None) -> FoundElements:
+def find_elements(
+    image: object, *, marks: object = None, seed: int = 0, progress: Progress | bool | None = None
+) -> FoundElements:
     """Find the elements that an image repeats, their layout, and their lattice or courses.
 
     Recent results are cached by the colours of the image.
@@ -186,6 +189,9 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     ----------
     image : array_like, path_like or PIL.Image.Image
         Shape (H, W) or (H, W, C), any dtype. The first three channels are colours. Transparent pixels are grey.
+    marks : array_like of int, optional
+        Known pixels, shape (H, W), such as strokes of a pen. Numbers from 1 are those of elements, -1 is the background,
+        and 0 is unknown. A few pixels of each element are enough.
     seed : int
         Seed of the pixels that the code words are learned from. Default: 0.
     progress : callable or True, optional
@@ -200,36 +206,54 @@ def find_elements(image: object, *, seed: int = 0, progress: Progress | bool | N
     Raises
     ------
     InvalidInput
-        If the image or the seed has another type, shape or range.
+        If the image, the marks or the seed have another type, shape or range.
+
+    Warns
+    -----
+    InputWarning
+        If nothing is found, so that the marks are ignored.
 
     Examples
     --------
     >>> from texrs import samples
     >>> from texrs.exemplar.element_finder import find_elements
-    >>> found = find_elements(samples.dots((128, 128)).image)
+    >>> image = samples.dots((128, 128)).image
+    >>> found = find_elements(image)
     >>> found.layout, found.lattice
     ('separate', None)
+
+    A stroke over one of the elements says that it is background:
+
+    >>> marks = -found.mask(0).astype(int)
+    >>> bool(find_elements(image, marks=marks).labels[found.mask(0)].any())
+    False
 
     """
     pixels, seed, progress = as_image(image, "image"), as_seed(seed), listen(progress)
     watch = progress or (lambda stage, share: ask())
     # The key contains the colours, so that an image and its colours in [0, 1] share one result.
     rgb = as_rgb(guidance(pixels))
+    known = None if marks is None else as_array(marks, "marks", np.int32, pixels.shape[:2])
+    if known is not None and known.min() < -1:
+        raise InvalidInput(f"marks: must be -1 (background), 0 (unknown) or numbers of elements, got {known.min()}")
     found = _FOUND.get_or_make(
-        content_hash(rgb, seed), lambda: analyse(rgb, seed, lambda share: watch("elements", share))
+        content_hash(rgb, seed, *([] if known is None else [known])),
+        lambda: analyse(rgb, seed, lambda share: watch("elements", share), known),
     )
+    if known is not None and known.any() and not found.elements:
+        ignore("marks: nothing was found in the image, so they are not used")
     watch("elements", 1.0)
     return found
 
 
-def analyse(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundElements:
+def analyse(rgb: Floats, seed: int, watch: Callable[[float], object], marks: Labels | None = None) -> FoundElements:
     """Find the elements of an image (H, W, 3) in [0, 1]. `watch` is called with the finished share of the work."""
     with answering(watch, 0.0):
         lattice, courses = find_regularity(rgb)
-    return replace(read_elements(rgb, seed, watch), lattice=lattice, courses=courses)
+    return replace(read_elements(rgb, seed, watch, marks), lattice=lattice, courses=courses)
 
 
-def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object]) -> FoundElements:
+def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object], marks: Labels | None) -> FoundElements:
     """Find the elements of an image and their layout, without its lattice and its courses."""
     small = reduce(rgb)
     if min(small.shape[:2]) < LEAST or float(np.ptp(small)) == 0:
@@ -237,7 +261,7 @@ def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object]) -> F
     with answering(watch, 0.0):
         contours = find_contours(small, seed)
     with answering(watch, 0.2):
-        choice = choose(contours)
+        choice = choose(contours, None if marks is None else scale_marks(marks, small.shape))
     if choice is None:
         return report_nothing(rgb.shape[0], rgb.shape[1])
     layouts = read_layout(choice, contours)
@@ -250,6 +274,14 @@ def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object]) -> F
     overlaps = find_overlaps(enlarge(labels, contours.words.shape)) if layout == "heap" else ()
     elements = measure_elements(labels, choice, overlaps)
     return FoundElements(labels, elements, layout, layouts[layout], layouts, overlaps)
+
+
+def scale_marks(marks: Labels, shape: tuple[int, ...]) -> Labels:
+    """Return the marks of an image at its reduced size. Small marks stay."""
+    places = np.argwhere(marks)
+    small = np.zeros(shape[:2], np.int32)
+    small[tuple((places * small.shape // marks.shape).T)] = marks[tuple(places.T)]
+    return small
 
 
 def report_nothing(rows: int, columns: int) -> FoundElements:

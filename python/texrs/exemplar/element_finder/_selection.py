@@ -10,9 +10,10 @@ from scipy import ndimage
 
 from texrs import _rust
 from texrs._progress import ask
-from texrs._typing import Floats
+from texrs._typing import Floats, Labels
 from texrs.exemplar.element_finder._candidates import Candidates, Leaves, make_candidates, make_leaves, measure
 from texrs.exemplar.element_finder._contour_strength import Contours
+from texrs.exemplar.element_finder._marks import heed_marks
 from texrs.exemplar.element_finder._quality import FLOOR, measure_quality
 
 Values = NDArray[np.float64]
@@ -117,17 +118,17 @@ class Choice:
     strength: Floats
 
 
-def choose(contours: Contours) -> Choice | None:
+def choose(contours: Contours, marks: Labels | None) -> Choice | None:
     """Return the best choice over all readings of lines, or None without elements."""
     for fewest in FEWEST:
-        found = [choose_reading(contours, lines, fewest) for lines in ("none", "dark", "light")]
+        found = [choose_reading(contours, lines, fewest, marks) for lines in ("none", "dark", "light")]
         best = max((one for one in found if one is not None), key=lambda one: one.score, default=None)
         if best is not None:
             return best
     return None
 
 
-def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None:
+def choose_reading(contours: Contours, lines: str, fewest: int, marks: Labels | None) -> Choice | None:
     """Return the best choice if lines of one kind are contours."""
     ask()
     # Merge the leaves, and keep candidates with a sufficient outline.
@@ -176,6 +177,8 @@ def choose_reading(contours: Contours, lines: str, fewest: int) -> Choice | None
     picked = np.flatnonzero(chosen)
     value = measure_value(candidates, quality, chosen)
     elements, rated = join_parts(candidates.pick(picked), quality[picked], leaves)
+    if marks is not None:
+        elements, rated = heed_marks(elements, rated, leaves, level, marks)
     return Choice(grow(elements, leaves, contours), elements, rated, value, score, lines, level, strength)
 
 
