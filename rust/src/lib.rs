@@ -12,6 +12,7 @@
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: a random value depends on its position, not on a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
+//! | `lattice` | the distance of a shift from the shifts of a lattice |
 //! | `libm` | exponentials, sines and roots with the same value on every machine |
 //! | `fft` | Fourier transforms of lines, images and volumes |
 //! | [`pca`] | principal components |
