@@ -7,6 +7,8 @@ PEERS := .venv-peers
 BIN := $(VENV)/bin
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
+# Tests that only read files. `make lint` runs them.
+STATIC := tests/test_architecture.py tests/test_architecture_rust.py
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
 .PHONY: help demo test test-rust test-python fuzz fuzz-kernels sanitize kills levels audit lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
@@ -62,7 +64,7 @@ test-rust: | requirements
 	cargo test --quiet --lib
 
 test-python: $(VENV)/.built
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q --durations=30
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q --durations=30 $(STATIC:%=--ignore=%)
 
 # Property tests, all hostile values of all arguments, damaged files, and, with a nightly compiler, the targets in fuzz/. Each round
 # has a seed. Rounds run until one fails or the time is up; SEED repeats one round.
@@ -119,6 +121,7 @@ lint-python: $(VENV)/.built
 	$(BIN)/python -m mypy.stubtest texrs._rust
 	$(BIN)/python .ci/prose
 	$(BIN)/python .ci/names
+	$(BIN)/python -m pytest -q $(STATIC)
 
 format: $(VENV)/.tools
 	cargo fmt

@@ -76,11 +76,16 @@ def imports(name: str) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", [n for n in FILES if n not in TOP])
-def test_no_import_runs_upwards(name: str) -> None:
-    package = name.partition(".")[0]
-    for other in sorted(imports(name)):
-        theirs = other.partition(".")[0]
+def list_imports() -> list[tuple[str, str]]:
+    """Return (module, imported module) of all files below the top layer."""
+    return [(name, other) for name in FILES if name not in TOP for other in sorted(imports(name))]
+
+
+def test_no_import_runs_upwards() -> None:
+    arrows = list_imports()
+    assert len(arrows) > 1000
+    for name, other in arrows:
+        package, theirs = name.partition(".")[0], other.partition(".")[0]
         if theirs != package:
             assert theirs in RANK, f"{name} imports {other}, which is in no layer"
             assert RANK[theirs] < RANK[package], f"{name} imports {other}, which lies no lower"
@@ -102,12 +107,11 @@ def test_papers_do_not_import_each_other() -> None:
             assert others <= {parts[1]}, name
 
 
-@pytest.mark.parametrize("name", [n for n in FILES if n not in TOP])
-def test_private_modules_are_imported_by_their_own_package_only(name: str) -> None:
-    package = name if FILES[name].name == "__init__.py" else name.rpartition(".")[0]
-    for other in imports(name):
+def test_private_modules_are_imported_by_their_own_package_only() -> None:
+    for name, other in list_imports():
+        package = name if FILES[name].name == "__init__.py" else name.rpartition(".")[0]
         owner, private, _ = other.partition("._")
-        assert not private or f"{package}.".startswith(f"{owner}."), other
+        assert not private or f"{package}.".startswith(f"{owner}."), f"{name} imports {other}"
 
 
 def test_every_module_has_a_layer() -> None:

@@ -61,10 +61,14 @@ def uses(code: str) -> set[tuple[str, str]]:
 FILES = files()
 
 
-@pytest.mark.parametrize(("path", "code"), FILES, ids=[path for path, _ in FILES])
-def test_arrows_point_down(path: str, code: str) -> None:
-    if path == "lib.rs":
-        return
+def test_arrows_point_down() -> None:
+    assert len(FILES) > 100
+    for path, code in FILES:
+        if path != "lib.rs":
+            check_arrows(path, code)
+
+
+def check_arrows(path: str, code: str) -> None:
     layer, module = path.removesuffix(".rs").split("/")[:2]
     assert layer in LAYERS, f"{path} stands in no layer"
     whole = module.endswith("_tests")  # Tests of a whole layer.

@@ -13,6 +13,7 @@ import pytest
 import typer
 
 import texrs
+from combinations import rotate
 from commands import COLOURS, TINY, Capture, complaint, files
 from texrs import SourceMap, samples
 from texrs.cli import COMMANDS, app, main
@@ -54,10 +55,7 @@ def list_pairs() -> list[tuple[str, str, str]]:
     A command finds its inputs and its outputs independently, so not every pair is needed.
     """
     return [
-        (command, reads[i % len(reads)], outputs[i % len(outputs)])
-        for command, (reads, outputs) in reads_and_writes().items()
-        if reads and outputs
-        for i in range(max(len(reads), len(outputs)))
+        (command, *pair) for command, (reads, outputs) in reads_and_writes().items() for pair in rotate(reads, outputs)
     ]
 
 

@@ -8,6 +8,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.ndimage import map_coordinates
 
 import texrs
+from combinations import pairwise
 from reference.look_up import look_up
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
@@ -26,9 +27,10 @@ DTYPES = [
 ]
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 7])
-@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize(
+    ("dtype", "channels", "interpolation"),
+    pairwise(DTYPES, [None, 1, 2, 3, 4, 7], ["nearest", "linear", "cubic"]),
+)
 def test_whole_coordinates_copy_every_dtype(dtype, channels, interpolation):
     rng = np.random.default_rng(1)
     shape = (9, 7) if channels is None else (9, 7, channels)

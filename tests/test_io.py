@@ -12,6 +12,7 @@ import tifffile
 from numpy.testing import assert_array_equal
 
 import image_files as make
+from combinations import pairwise
 from texrs import io as tio
 from texrs.errors import FileError, InputWarning, InvalidInput, LimitExceeded
 
@@ -45,9 +46,10 @@ def test_lossless_formats_give_back_what_came(tmp_path, suffix, dtype, channels)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(f"{n}{suffix}" for n in (1, 3, 33, 4))
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32", "float64"])
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 7])
-@pytest.mark.parametrize("suffix", [".tif", ".npy", ".npz"])
+@pytest.mark.parametrize(
+    ("dtype", "channels", "suffix"),
+    pairwise(["uint8", "uint16", "float16", "float32", "float64"], [None, 1, 2, 3, 4, 7], [".tif", ".npy", ".npz"]),
+)
 def test_volumes_give_back_what_came(tmp_path, suffix, channels, dtype):
     for planes in (1, 3, 4, 9):
         shape = (planes, 6, 5) if channels is None else (planes, 6, 5, channels)

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.sparse import eye_array
 
+from combinations import rotate
 from hostile import DTYPES, LAYOUTS, NUMBERS, OTHERS, VALUES, lay_out
 from texrs import kernels
 from texrs.errors import TexrsError
@@ -329,10 +330,16 @@ def equal(a: Any, b: Any) -> bool:
     return type(a).__module__.startswith("texrs") or bool(a == b)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS[1:-1])
-@pytest.mark.parametrize(
-    ("name", "argument"), [(n, a) for n, a in PAIRS if isinstance(CALLS[n][1][a], np.ndarray) and n != "poisson.spread"]
-)
+def list_layouts() -> list[tuple[str, str, str]]:
+    """Return all array arguments of each kernel, and all layouts for each kernel."""
+    found = []
+    for name in CALLS.keys() - {"poisson.spread"}:
+        arrays = [a for n, a in PAIRS if n == name and isinstance(CALLS[n][1][a], np.ndarray)]
+        found += [(name, *pair) for pair in rotate(arrays, LAYOUTS[1:-1])]
+    return sorted(found)
+
+
+@pytest.mark.parametrize(("name", "argument", "layout"), list_layouts())
 def test_a_layout_in_memory_does_not_matter(name: str, argument: str, layout: str) -> None:
     call, arguments = CALLS[name]
     assert equal(call(**arguments), call(**(arguments | {argument: lay_out(arguments[argument], layout)})))

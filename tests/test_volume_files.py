@@ -12,6 +12,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import image_files as make
+from combinations import pairwise
 from texrs import io as tio
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 
@@ -22,9 +23,7 @@ READ = [".nrrd", ".nii", ".nii.gz"]
 DTYPES = [f"{kind}int{bits}" for kind in ("u", "") for bits in (8, 16, 32, 64)] + ["float32", "float64"]
 
 
-@pytest.mark.parametrize("suffix", READ)
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 7])
+@pytest.mark.parametrize(("dtype", "channels", "suffix"), pairwise(DTYPES, [None, 1, 2, 3, 4, 7], READ))
 def test_volumes_give_back_what_came(tmp_path, suffix, dtype, channels):
     for sides in ((5, 4, 3), (1, 6, 2), (2, 1, 1)):
         volume = make.picture(sides if channels is None else (*sides, channels), dtype)
