@@ -8,7 +8,7 @@ from html import escape
 
 import imageio.v3 as iio
 
-from texrs._show import preview
+from texrs._show import fill_page, preview
 from texrs._typing import Array
 from texrs._version import __version__
 
@@ -110,7 +110,8 @@ def document(
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>{escape(title)}: {escape(lead[:1].lower() + lead[1:].rstrip("."))}</title>
-<style>{STYLE}{style}</style>
+<style>
+{fill_page("page.css")}{style}</style>
 </head>
 <body>
 <header><h1>{escape(title)}</h1><p>{escape(lead)}</p><nav>{menu}</nav></header>
@@ -126,55 +127,3 @@ def document(
 def _caption(text: str, note: str = "") -> str:
     extra = f"<small>{escape(note)}</small>" if note else ""
     return f"<figcaption>{escape(text)}{extra}</figcaption>"
-
-
-STYLE = """
-:root { --ink: #1c1b19; --soft: #6a665f; --paper: #faf8f5; --card: #fff; --line: #e4dfd7; --accent: #a4491f; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #ece8e1; --soft: #a09a90; --paper: #161513; --card: #201f1c; --line: #37342f; --accent: #e8996c; }
-}
-* { box-sizing: border-box; }
-html { scroll-behavior: smooth; }
-body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
-header, main, footer { max-width: 1080px; margin: 0 auto; padding: 0 1.25rem; }
-header { padding-top: 3rem; }
-h1 { margin: 0; font-size: 3rem; line-height: 1.1; letter-spacing: -.03em; }
-header p { margin: .25rem 0 1.25rem; font-size: 1.25rem; color: var(--soft); }
-nav { display: flex; flex-wrap: wrap; gap: .5rem; }
-nav a { padding: .3rem .8rem; border: 1px solid var(--line); border-radius: 99px; background: var(--card);
-  color: inherit; font-size: .9rem; text-decoration: none; }
-nav a:hover, nav a:focus-visible { border-color: var(--accent); color: var(--accent); }
-section { padding: 2.5rem 0 .5rem; }
-h2 { margin: 0; font-size: 1.6rem; letter-spacing: -.015em; }
-h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
-.lead { max-width: 44rem; margin: .35rem 0 1.25rem; color: var(--soft); }
-pre { margin: 0 0 1.25rem; padding: .8rem 1rem; overflow-x: auto; border: 1px solid var(--line); border-radius: 8px;
-  background: var(--card); font-size: .85rem; line-height: 1.5; }
-figure { margin: 0; }
-img, .ground { display: block; width: 100%; height: auto; border-radius: 6px; }
-.ground { background: var(--picture) 0 0 / 100% 100%; }
-.ground.four { background-size: 50% 50%; }
-figcaption { padding-top: .4rem; font-size: .875rem; line-height: 1.35; }
-figcaption { overflow-wrap: anywhere; }
-small { display: block; color: var(--soft); font-size: .8rem; }
-.row { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 4fr); gap: 1rem; margin-bottom: 1rem; padding: 1rem;
-  border: 1px solid var(--line); border-radius: 12px; background: var(--card); }
-.pair { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 1rem; }
-.grid { display: grid; gap: 1rem; margin-bottom: 1rem;
-  grid-template-columns: repeat(auto-fill, minmax(max(var(--least), 100% / var(--most) - 1rem), 1fr)); }
-.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 26rem), 1fr)); gap: 1rem;
-  margin-bottom: 1rem; }
-.card { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 5fr); gap: .9rem; padding: .9rem;
-  border: 1px solid var(--line); border-radius: 12px; background: var(--card); }
-.given { display: grid; gap: .9rem; align-content: start; }
-.opening { margin-bottom: 1rem; }
-.opening .detail { height: min(26rem, 70vw); background-size: var(--wide) auto; background-position: center; }
-.opening .row { margin-top: 1rem; }
-@media (max-width: 620px) {
-  .row, .pair, .card { grid-template-columns: minmax(0, 1fr); }
-  .row > figure:first-child, .given > figure:only-child { width: 50%; }
-  .given { grid-auto-flow: column; grid-auto-columns: minmax(0, 1fr); }
-}
-footer { margin-top: 2.5rem; padding-top: 1rem; padding-bottom: 3rem; border-top: 1px solid var(--line);
-  color: var(--soft); font-size: .875rem; }
-"""

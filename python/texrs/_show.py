@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,3 +89,9 @@ def as_png(image: Array) -> bytes:
     from texrs.io.image_io import encode
 
     return encode("image", np.ascontiguousarray(preview(image)), "png")
+
+
+def fill_page(name: str, **values: object) -> str:
+    """Return a file of the folder ``pages`` with the given values in place of each ``@name@``."""
+    text = Path(__file__).with_name("pages").joinpath(name).read_text(encoding="utf-8")
+    return re.sub(r"@(\w+)@", lambda found: str(values[found[1]]), text)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texrs._show import as_png, preview
+from texrs._show import as_png, fill_page, preview
 from texrs._typing import Array
 from texrs.io.pillow import encode
 
@@ -24,56 +24,6 @@ _STEPS = 12
 _SIDE = 260
 """Length on the screen of the longest side of a volume, in pixels."""
 _NAMES = ("plane", "row", "column")
-
-_PAGE = """\
-<div class="texrs-slices" id="{id}" style="font:13px sans-serif">
-<img alt="three slices of a volume of {sides}" src="data:image/png;base64,{still}">
-<script>(() => {{
-for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
-  box.dataset.on = 1;
-  const n = {shape}, step = {step}, wide = {wide}, names = {names}, picture = new Image();
-  picture.onload = () => {{
-    const all = document.createElement("canvas");
-    [all.width, all.height] = [picture.width, picture.height];
-    const from = all.getContext("2d", {{willReadFrequently: true}});
-    from.drawImage(picture, 0, 0);
-    const voxels = new Uint32Array(from.getImageData(0, 0, all.width, all.height).data.buffer);
-    const at = (p, r, c) => voxels[(Math.floor(p / wide) * n[1] + r) * all.width + (p % wide) * n[2] + c];
-    const row = document.createElement("div");
-    row.style = "display:flex;flex-wrap:wrap;gap:12px;align-items:flex-end";
-    names.forEach((name, axis) => {{
-      const [down, along] = [0, 1, 2].filter(a => a != axis), part = document.createElement("label");
-      const canvas = document.createElement("canvas"), slider = document.createElement("input");
-      const says = document.createElement("div"), zoom = {side} / Math.max(...n);
-      [canvas.width, canvas.height] = [n[along], n[down]];
-      canvas.style = `display:block;image-rendering:pixelated;width:${{n[along] * zoom}}px;height:${{n[down] * zoom}}px`;
-      Object.assign(slider, {{type: "range", min: 0, max: n[axis] - 1, value: n[axis] >> 1}});
-      slider.style = `width:${{Math.max(90, n[along] * zoom)}}px;margin:4px 0 0`;
-      slider.setAttribute("aria-label", name);
-      const draw = () => {{
-        const place = [0, 0, 0], to = canvas.getContext("2d"), out = to.createImageData(n[along], n[down]);
-        const pixels = new Uint32Array(out.data.buffer);
-        place[axis] = +slider.value;
-        for (let i = 0, d = 0; d < n[down]; d++)
-          for (let a = 0; a < n[along]; a++) {{
-            [place[down], place[along]] = [d, a];
-            pixels[i++] = at(...place);
-          }}
-        to.putImageData(out, 0, 0);
-        says.textContent = `${{name}} ${{slider.value * step[axis]}} of {sides_list}`.replace("*", {whole}[axis]);
-      }};
-      slider.oninput = draw;
-      part.append(canvas, slider, says);
-      row.append(part);
-      draw();
-    }});
-    box.querySelector("img").replaceWith(row);
-  }};
-  picture.src = "data:image/webp;base64,{voxels}";
-}}
-}})()</script>
-</div>
-"""
 
 
 def as_page(volume: Array) -> str:
@@ -100,7 +50,8 @@ def as_page(volume: Array) -> str:
             break
     still = b64encode(as_png(_show_still(seen))).decode()
     digest = hashlib.sha256(packed).hexdigest()[:12]
-    return _PAGE.format(
+    return fill_page(
+        "slices.html",
         id=f"texrs-{digest}",
         sides=" x ".join(map(str, sides)),
         still=still,
@@ -110,7 +61,6 @@ def as_page(volume: Array) -> str:
         names=list(_NAMES),
         side=_SIDE,
         whole=list(sides),
-        sides_list="*",
         voxels=b64encode(packed).decode(),
     )
 

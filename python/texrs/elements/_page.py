@@ -9,6 +9,7 @@ from html import escape
 import imageio.v3 as iio
 
 from texrs._checks import as_instance
+from texrs._show import fill_page
 from texrs._version import __version__
 from texrs.elements._drawing import Picture, draw_plain
 from texrs.elements._drawn_stages import draw
@@ -72,7 +73,8 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
     data = json.dumps(known).replace("<", "\\u003c")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark"><title>{escape(title)}</title><style>{STYLE}</style></head><body>
+<meta name="color-scheme" content="light dark"><title>{escape(title)}</title><style>
+{fill_page("elements.css")}</style></head><body>
 <h1>{escape(title)}</h1>
 <p>{len(entry.points)} elements in {height} x {width} pixels; foreground {entry.mask.mean():.0%};
 {escape(entry.arrangement.describe(entry.layout))}.</p>
@@ -86,7 +88,8 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
 <label for="list">Corrections: save them to a file for <code>--corrections FILE.json</code>.</label>
 <textarea id="list" rows="6" readonly></textarea>
 <script>const known = {data};
-{SCRIPT}</script>
+
+{fill_page("elements.js")}</script>
 <footer>Made by <code>texrs analyse</code>, version {escape(__version__)}.</footer></body></html>
 """
 
@@ -94,49 +97,3 @@ def to_html(entry: ElementAnalysis, title: str = "elements") -> str:
 def _to_uri(picture: Picture) -> str:
     file = iio.imwrite("<bytes>", picture, extension=".png", plugin="pillow") or b""
     return f"data:image/png;base64,{base64.b64encode(file).decode('ascii')}"
-
-
-STYLE = """
-body { max-width: 1080px; margin: 0 auto; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
-svg, img { width: 100%; height: auto; image-rendering: pixelated; border: 1px solid #8884; }
-th { text-align: left; padding-right: 1rem; } .doubt { color: #c43c0c; }
-ellipse { fill: #0000; stroke: #ffeb5a; stroke-width: 1; cursor: pointer; vector-effect: non-scaling-stroke; }
-.gone ellipse { stroke: #f33; stroke-dasharray: 3 3; } .new ellipse { stroke: #3e3; }
-text { fill: #ffeb5a; paint-order: stroke; stroke: #000; text-anchor: middle; dominant-baseline: central;
-  pointer-events: none; }
-.gone text { fill: #f77; text-decoration: line-through; } textarea { width: 100%; font: 13px monospace; }
-figure { margin: 1rem 0; } footer { color: #888; font-size: .875rem; padding: 1rem 0; }
-"""
-SCRIPT = """
-const view = document.getElementById('view'), marks = document.getElementById('marks');
-const list = document.getElementById('list'), layout = document.getElementById('layout');
-const gone = new Set(), added = [], svg = 'http://www.w3.org/2000/svg';
-const size = Math.max(4, Math.min(...known.box) / 3);
-function mark(point, name, scale, angle, kind, act) {
-  const group = marks.appendChild(document.createElementNS(svg, 'g')), [row, column] = point;
-  const ring = group.appendChild(document.createElementNS(svg, 'ellipse'));
-  ring.setAttribute('rx', known.box[1] * scale / 2); ring.setAttribute('ry', known.box[0] * scale / 2);
-  ring.setAttribute('transform', `translate(${column} ${row}) rotate(${-angle})`);
-  ring.addEventListener('click', event => { event.stopPropagation(); act(); draw(); });
-  const text = group.appendChild(document.createElementNS(svg, 'text'));
-  text.textContent = name; text.setAttribute('x', column); text.setAttribute('y', row);
-  text.setAttribute('font-size', size); group.setAttribute('class', kind);
-}
-function draw() {
-  marks.replaceChildren();
-  known.points.forEach((point, k) => mark(point, k, known.scales[k], known.angles[k], gone.has(k) ? 'gone' : '',
-    () => gone.has(k) ? gone.delete(k) : gone.add(k)));
-  added.forEach((point, k) => mark(point, '+', 1, 0, 'new', () => added.splice(k, 1)));
-  const steps = [...known.earlier];
-  if (gone.size) steps.push({op: 'drop', elements: [...gone].sort((a, b) => a - b)});
-  if (added.length) steps.push({op: 'add', points: added});
-  if (layout.value !== known.layout) steps.push({op: 'layout', layout: layout.value});
-  list.value = JSON.stringify(steps);
-}
-view.addEventListener('click', event => {
-  const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(view.getScreenCTM().inverse());
-  added.push([Math.round(10 * at.y) / 10, Math.round(10 * at.x) / 10]); draw();
-});
-layout.addEventListener('change', draw);
-draw();
-"""
