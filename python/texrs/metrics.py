@@ -24,7 +24,7 @@ from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.exemplar.shapes import mark_outlines
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.source_map import SourceMap
 
 __all__ = ["Quality", "evaluate"]
@@ -270,7 +270,7 @@ class Seam:
 
     def look_across(self, image: Floats) -> tuple[Floats, Floats]:
         """Return the values of an image of the exemplar at the sources of the pixels on both sides."""
-        first, second = (gather(image, self.source.coordinates[at], interpolation="nearest") for at in self.sides)
+        first, second = (sample(image, self.source.coordinates[at], interpolation="nearest") for at in self.sides)
         return first, second
 
     @property
@@ -350,7 +350,7 @@ def _list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], a
         ways[:] = (frame[source.label[at]] if frame.ndim == 3 else frame[at])[..., along]
     found = []
     for step in (-1, 0, 1):
-        each = gather(slopes, source.coordinates[at] + np.float32(step) * ways, interpolation="nearest")
+        each = sample(slopes, source.coordinates[at] + np.float32(step) * ways, interpolation="nearest")
         rows, columns = np.split(each, 2, axis=-1)
         found.append(rows * ways[:, :1] + columns * ways[:, 1:])
     return found
@@ -372,7 +372,7 @@ def _measure_blur(traits: _Traits, source: SourceMap, seams: list[Seam], image: 
     # Scaled or rotated pixels are softer, which is not seam blur: the source gives the expected detail.
     wanted, shown = (
         np.abs(np.stack([laplace(seen[..., c]) for c in range(seen.shape[-1])], axis=-1)[band]).mean()
-        for seen in (gather(traits.colours, source.coordinates, interpolation="cubic"), image)
+        for seen in (sample(traits.colours, source.coordinates, interpolation="cubic"), image)
     )
     return float(np.clip(1 - shown / wanted, 0, 1)) if wanted > 0 else 0.0
 

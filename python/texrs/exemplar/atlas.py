@@ -19,7 +19,7 @@ from texrs._arrays import log_single
 from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import ONE, halve
 from texrs._typing import Array, Bools, Floats
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.source_map import SourceMap
 
 if TYPE_CHECKING:
@@ -350,7 +350,7 @@ def code_values(
         ]
         grid = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
         size = np.float32(np.log(copy.factor).mean())
-        values[here][..., 0] = code_logs(gather(logs, grid, interpolation="linear") + size)
+        values[here][..., 0] = code_logs(sample(logs, grid, interpolation="linear") + size)
         values[here][..., 1] = round(float(size) * NAT * RESIZED**0.5)
     return values.reshape(-1)
 

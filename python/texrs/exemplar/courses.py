@@ -28,7 +28,7 @@ from texrs.exemplar.regularity import (
     list_places,
 )
 from texrs.exemplar.shapes import widen
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.source_map import SourceMap
 
 __all__ = ["Courses", "find_courses", "find_regularity"]
@@ -131,7 +131,7 @@ def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
         return None
     courses = Courses(axis, slope, ())
     shown = courses.level(guide.shape[:2])
-    level = gather(guide, shown.coordinates, interpolation="cubic") if slope else guide
+    level = sample(guide, shown.coordinates, interpolation="cubic") if slope else guide
     light = level.mean(axis=-1, dtype=np.float64)
     joints = find_joints(light if axis == 0 else light.T)
     if len(joints) <= FEWEST or (lattice is not None and repeats(lattice, courses, level)):

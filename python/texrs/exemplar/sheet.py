@@ -24,7 +24,7 @@ from texrs.exemplar.adjacency import Adjacency, measure_adjacency
 from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, resize
 from texrs.exemplar.separate_elements import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.scale_maps.kinds import AREAS, Kind, find_kind
 from texrs.scale_maps.slope import Slope
 
@@ -234,7 +234,7 @@ class Flattened(Sheet):
         if known is not None:
             near = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
             inside &= known[near[..., 0], near[..., 1]]
-        shown = gather(colours, mirror(at, shape).astype(np.float32), interpolation="linear")
+        shown = sample(colours, mirror(at, shape).astype(np.float32), interpolation="linear")
         return cls(shape, shown, log_single(scales), inside, plane, (float(low[0]), float(low[1])), resolution)
 
     def analyse(self) -> tuple[Instances | None, Adjacency]:
@@ -251,7 +251,7 @@ class Flattened(Sheet):
         rows, columns = np.nonzero(self.free)
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         places = np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
-        shown[rows, columns] = gather(image, self.locate(places)[0])
+        shown[rows, columns] = sample(image, self.locate(places)[0])
         return shown
 
     def describe(self) -> dict[str, Any]:
@@ -355,7 +355,7 @@ class Copies(Sheet):
             here = copy.window
             shown[here], owner[here] = resize(colours, copy), number
             free[here] = True
-            sized[here] = gather(logs, lay_out(copy)) + np.float32(np.log(copy.factor).mean())
+            sized[here] = sample(logs, lay_out(copy)) + np.float32(np.log(copy.factor).mean())
         fill_gaps(shown, copies, 1)
         return cls(shape, shown, sized, free, copies, owner)
 
@@ -367,14 +367,14 @@ class Copies(Sheet):
         labels, depth = np.zeros(self.free.shape, np.uint32), np.zeros(self.free.shape, np.float32)
         for number, copy in enumerate(self.copies):
             here, at = copy.window, lay_out(copy)
-            classes[here] = gather(beside.classes, at, interpolation="nearest")
+            classes[here] = sample(beside.classes, at, interpolation="nearest")
             if found is not None:
-                own = gather(found.labels, at, interpolation="nearest")
+                own = sample(found.labels, at, interpolation="nearest")
                 # Give an element another number in each copy.
                 labels[here] = np.where(own > 0, own + number * found.count, 0)
                 # Mask the interpolated depths, because they extend beyond the borders of elements.
-                inside = gather(found.depth > 0, at, interpolation="nearest")
-                depth[here] = gather(found.depth, at) * inside * np.float32(np.sqrt(np.prod(copy.factor)))
+                inside = sample(found.depth > 0, at, interpolation="nearest")
+                depth[here] = sample(found.depth, at) * inside * np.float32(np.sqrt(np.prod(copy.factor)))
         fill_gaps(classes, self.copies, 1)
         if found is not None:
             there = np.bincount(labels.ravel()) > 0
@@ -386,7 +386,7 @@ class Copies(Sheet):
         """Return another image resized and packed in the same way."""
         shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
         for copy in self.copies:
-            shown[copy.window] = gather(image, lay_out(copy))
+            shown[copy.window] = sample(image, lay_out(copy))
         return shown
 
     def describe(self) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -85,32 +86,51 @@ def gather(
     if len(kinds) > 1:
         raise InvalidInput(f"exemplars: must have the same dtype and number of channels, got {sorted(kinds)}")
     shape = points.shape[:-1]
-    if which is None:
-        index = np.zeros(0, np.uint16)
-    else:
+    index = None
+    if which is not None:
         index = as_array(which, "which", np.uint16, shape)
         if index.size and index.max() >= len(images):
             raise InvalidInput(
                 f"which: must contain indices from 0 to {len(images) - 1}, got {index.min()} to {index.max()}"
             )
-    how = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
-    dtype = images[0].dtype
-    if dtype.kind in "ui" and dtype.itemsize == 8:
-        how = _find_exact(how, images, points)
-    out = _rust.gather(
-        [_to_kernel(e, how) for e in images], as_wrap(wrap, axes=axes), index.reshape(-1), points.reshape(-1, axes), how
-    )
+    how: Any = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
+    out = sample(images, points, index, interpolation=how, wrap=as_wrap(wrap, axes=axes))
     if out.dtype.kind == "f" and not np.isfinite(out).all():
         # Check the result instead of the exemplar, because it is faster to read a few pixels than a large exemplar.
         for image in images:
             check_finite(image, "exemplars")
+    return out if several[0].ndim > axes else out.reshape(points.shape[:-1])
+
+
+def sample(
+    exemplars: Array | Sequence[Array],
+    coordinates: Array,
+    which: Array | None = None,
+    *,
+    interpolation: Interpolation = "linear",
+    wrap: Sequence[bool] | None = None,
+) -> Array:
+    """Return the result of `gather` for arrays that were checked before.
+
+    The exemplars are finite, and have the same dtype and number of channels. The compiled code still refuses shapes
+    that do not match, and indices that are out of range.
+    """
+    points = np.ascontiguousarray(coordinates, np.float32)
+    several, axes = [exemplars] if isinstance(exemplars, np.ndarray) else exemplars, points.shape[-1]
+    images = [np.ascontiguousarray(e if e.ndim > axes else e[..., np.newaxis]) for e in several]
+    how, dtype = str(interpolation), images[0].dtype
+    if dtype.kind in "ui" and dtype.itemsize == 8:
+        how = _find_exact(how, images, points)
+    index = np.zeros(0, np.uint16) if which is None else np.ascontiguousarray(which, np.uint16).reshape(-1)
+    periodic = (False,) * axes if wrap is None else tuple(wrap)
+    out = _rust.gather([_to_kernel(e, how) for e in images], periodic, index, points.reshape(-1, axes), how)
     # Convert back to the dtype of the exemplars, because the kernel may not support it.
     if dtype == np.bool_ or out.dtype == np.uint32:
         out = out.view(dtype)
     elif dtype != out.dtype:
         out = (np.rint(out) if dtype.kind in "ui" else out).astype(dtype)
-    had_channels = several[0].ndim > axes
-    return out.reshape((*shape, images[0].shape[-1]) if had_channels else shape)
+    shape = points.shape[:-1]
+    return out.reshape((*shape, images[0].shape[-1]) if several[0].ndim > axes else shape)
 
 
 def _find_exact(interpolation: str, images: Sequence[Array], points: Floats) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Floats, Labels
 from texrs.exemplar.cells import Cells
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.mosaic.choice import Shortlist
 from texrs.mosaic.outlines import Matched, interpolate, match_outlines, rematch_outlines
 from texrs.mosaic.tessellation import Tessellation
@@ -148,7 +148,7 @@ def _draw(
     knot = np.asarray(at / step[which], np.float32)
     knot[:, 0] += which * count
     tall = np.ascontiguousarray(grid.reshape(-1, count, 2))
-    moved = at + (corner - middle)[which] + gather(tall, knot[None], interpolation="linear")[0]
+    moved = at + (corner - middle)[which] + sample(tall, knot[None], interpolation="linear")[0]
 
     # Undo the rotation and the scale, to get positions in A.
     angle = np.radians(charts.turn[group])
@@ -220,7 +220,7 @@ def _slide(
     at = np.asarray(places[kept] - fields.corner[kind], np.float32)
 
     def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
-        return np.asarray(gather(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
+        return np.asarray(sample(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
 
     # Near the outline, use the depth in the target cell. Further inside, keep the depth in the source cell, but stay
     # out of the joint.

@@ -12,7 +12,7 @@ from texrs._engine.stitcher import FREE, Pasting, Samples
 from texrs._typing import Array, Bools
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.shapes import mark_outlines
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.mosaic.charts import BAND, Charts
 
 __all__ = ["Joined", "join"]
@@ -49,7 +49,7 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
     colours = guidance(as_image(image))
     colours = colours / max(float(colours.std()), 1e-6)
     far = distance_transform_edt(~mark_outlines(cells.labels)).astype(np.float32)
-    looked = gather(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
+    looked = sample(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
     band = max(2.0, BAND * cells.size)
     # Add the depth inside a cell to the cost, so that seams run along joints.
     inside = np.clip(STEEP * (looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1), 0, DEEP)

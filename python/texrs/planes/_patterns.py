@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from texrs._progress import ask
 from texrs._typing import Bools, Floats
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 
 __all__ = ["blur_levels", "follow", "measure_in_sizes", "measure_windows"]
 
@@ -173,7 +173,7 @@ class _Flat:
             part = np.clip(part, 0, 1)
             some = np.nonzero(part)[0]
             if len(some):
-                shown = gather(level[..., np.newaxis], places[some][np.newaxis], interpolation="linear")
+                shown = sample(level[..., np.newaxis], places[some][np.newaxis], interpolation="linear")
                 values[some] += part[some] * shown[0, :, 0]
         self.picture = np.zeros(sides)
         self.picture[self.known] = values

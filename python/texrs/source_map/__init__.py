@@ -15,12 +15,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items, as_list, as_ndarray, as_wrap, check_memory
+from texrs._arrays import (
+    as_bool,
+    as_choice,
+    as_image,
+    as_instance,
+    as_int,
+    as_items,
+    as_list,
+    as_ndarray,
+    as_wrap,
+    check_memory,
+)
 from texrs._checks import check_pixels
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import InvalidInput
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.source_map._antialias import find_shrinking, gather_smoothed
 from texrs.source_map._files import read_map, write_map
 from texrs.source_map._finish import RenderOptions
@@ -275,7 +286,9 @@ class SourceMap(Parted):
         for i, (image, shape) in enumerate(zip(images, self.shapes, strict=True)):
             if image.shape[: self.axes] != shape:
                 raise InvalidInput(f"exemplars: exemplar {i} must have size {shape}, got {image.shape[: self.axes]}")
-        out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
+        how: Any = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
+        shown = [image.reshape(each.shape) for image, each in zip(images, several, strict=True)]
+        out = sample(shown, self.coordinates, self.exemplar, interpolation=how)
         if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
         if isinstance(map_type, str) and map_type == "colour":

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import log_single, power_single
 from texrs._typing import Array, Floats, Interpolation
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.source_map._parts import Parted
 
 __all__ = ["find_shrinking", "gather_smoothed"]
@@ -77,7 +77,7 @@ def gather_smoothed(
                 if k > 0:
                     sigmas = (sigma,) * axes + (0,) * (image.ndim - axes)
                     smooth = ndimage.gaussian_filter(smooth, sigmas, mode="nearest")
-                shown = gather(smooth, at[own], interpolation=interpolation)
+                shown = sample(smooth, at[own], interpolation=interpolation)
                 mixed[own] += shown * weight[own].reshape(-1, *(1,) * len(channels))
     if out.dtype.kind in "ui":
         ends = np.iinfo(out.dtype)

@@ -20,7 +20,7 @@ from texrs.exemplar import Exemplar
 from texrs.exemplar.period import Period, confirm_lattice, find_period
 from texrs.exemplar.regularity import Lattice, bend, find_lattice
 from texrs.growth import stitch_image
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.mosaic import rearrange_cells
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
@@ -132,9 +132,9 @@ def close_lattice(exemplar: Exemplar, picture: Picture, size: tuple[int, int], w
     source = bend(picture.source.shape, closing)
     return replace(
         picture,
-        colours=gather(picture.colours, source.coordinates, interpolation="cubic"),
+        colours=sample(picture.colours, source.coordinates, interpolation="cubic"),
         source=source,
-        depth=gather(picture.depth, source.coordinates, interpolation="nearest"),
+        depth=sample(picture.depth, source.coordinates, interpolation="nearest"),
         regular=True,
         lattice=closing @ lattice.vectors,
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array, Bools, Floats, Labels
 from texrs.exemplar.symmetry import Flip
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.kernels.seam import cut
 from texrs.papers.design.elements import CONTEXT, INNER, Element, Placement
 from texrs.source_map import SourceMap
@@ -94,7 +94,7 @@ class Canvas(Draft):
         band = (placement.distance < 0) & (placement.distance > -CONTEXT) & placement.inside
         if not band.any():
             return False
-        there = gather(picture, placement.coordinates, interpolation="nearest")
+        there = sample(picture, placement.coordinates, interpolation="nearest")
         difference = np.abs(there - self.colours[placement.window]).mean(axis=-1)[band].mean()
         return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
 
@@ -112,9 +112,9 @@ class Canvas(Draft):
         """Stitch an element and its context band into the canvas along a minimum cut (Eq. 3)."""
         window, hard = placement.window, placement.hard
         # Around the element, offer only background pixels, because parts of other elements would look torn.
-        ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
+        ground = sample(labels, placement.coordinates, interpolation="nearest") == 0
         offered = ((placement.distance > -1) | ((placement.distance > -CONTEXT) & ground)) & placement.inside
-        colours = gather(picture, placement.coordinates, interpolation="cubic")
+        colours = sample(picture, placement.coordinates, interpolation="cubic")
         known = self.covered[window]
         taken = offered
         if (offered & known).any():

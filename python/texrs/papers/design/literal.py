@@ -25,7 +25,7 @@ import numpy as np
 from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats, Labels
 from texrs.errors import InvalidInput
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.kernels.seam import cut
 from texrs.papers.design.canvas import Draft
 from texrs.papers.design.logistic_map import iterate
@@ -142,9 +142,9 @@ def stitch_layers(
         places: Floats = (centre + (whole.coordinates - centre - shift) @ inverse.T).astype(np.float32)
         inside = np.all((places >= 0) & (places <= last), axis=-1)
         # The layer covers a pixel if it has more than half of the interpolation weight at the pixel's source position.
-        mask = gather((layers == layer).astype(np.float32), places, interpolation="linear")
+        mask = sample((layers == layer).astype(np.float32), places, interpolation="linear")
         offered: Bools = inside & (mask > 0.5)
-        colours = gather(picture, places, interpolation="cubic")
+        colours = sample(picture, places, interpolation="cubic")
         taken = offered
         if (offered & made.covered).any():
             taken = offered & cut(made.colours, colours, made.covered, offered, cost="paper").mask

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.papers.design.deformation import classify
 from texrs.papers.design.elements import Element, measure_elements
 from texrs.papers.design.mixing import draw_noise
@@ -123,7 +123,7 @@ def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, w
     away = np.moveaxis(np.indices(last - first + 1), 0, -1).reshape(-1, 2) + first
     coordinates = (away @ inverse.T + centre).astype(np.float32)
     local = coordinates - element.origin.astype(np.float32)
-    distance = gather(element.distance, local[np.newaxis], interpolation="linear")[0]
+    distance = sample(element.distance, local[np.newaxis], interpolation="linear")[0]
     inside = (coordinates >= 0).all(axis=1) & (coordinates <= np.array(shape) - 1).all(axis=1)
     taken = (distance > -GAP) & (local >= 0).all(axis=1) & (local <= np.array(element.distance.shape) - 1).all(axis=1)
     mine = (distance > EDGE) & inside

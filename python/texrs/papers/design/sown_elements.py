@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from texrs.errors import InvalidInput
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.kernels.seam import cut
 from texrs.papers.design.elements import Element, measure_elements
 from texrs.papers.design.plan import Plan
@@ -78,7 +78,7 @@ def lay_sown_elements(plan: Plan, bare: SourceMap, wrap: tuple[bool, bool], seed
             label[rows, columns] = count + number
             offered[rows, columns] = True
             core[rows, columns] |= not band
-    here, there = (gather(plan.guide, each, interpolation="nearest") for each in (bare.coordinates, coordinates))
+    here, there = (sample(plan.guide, each, interpolation="nearest") for each in (bare.coordinates, coordinates))
     taken = cut(here, there, np.ones(bare.shape, bool), offered, core_b=core, cost="paper", wrap=wrap).mask & offered
     coordinates[~taken], label[~taken] = bare.coordinates[~taken], bare.label[~taken]
     unmoved = np.broadcast_to(np.eye(2, dtype=np.float32), (len(sown.of), 2, 2))

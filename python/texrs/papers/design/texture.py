@@ -10,7 +10,7 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.blending import apply, measure_visibility
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
 from texrs.papers.design.mixing import Layer, mix
@@ -57,8 +57,8 @@ def measure_layer(source: SourceMap, plan: Plan) -> Layer:
     depth, elements = np.zeros((2, *plan.guide.shape[:2]), np.float32)
     if parts.kind in ("components", "labels"):
         depth, elements = parts.measure_depth(DEEP), (parts.elements > 0).astype(np.float32)
-    colours = gather(plan.guide, where, interpolation="nearest")
-    shown = gather(np.stack([depth, elements], axis=-1), where, interpolation="nearest")
+    colours = sample(plan.guide, where, interpolation="nearest")
+    shown = sample(np.stack([depth, elements], axis=-1), where, interpolation="nearest")
     return Layer(source, colours, shown[..., 0], shown[..., 1] > 0)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.exemplar.patches import place_patches
 from texrs.exemplar.symmetry import flip, flip_coordinates, flip_frame
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.kernels.inpaint import inpaint
 from texrs.papers.design.canvas import Draft, Tile
 from texrs.papers.design.plan import Plan
@@ -65,7 +65,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
         label = np.where(filled.label >= 0, len(frames) + filled.label, label).astype(np.uint32)
         frames += jacobians
     source = SourceMap(coordinates, np.full(shape, which, np.uint16), label, np.array(frames, np.float32), shapes)
-    colours = gather(plan.guide, coordinates, interpolation="cubic")
+    colours = sample(plan.guide, coordinates, interpolation="cubic")
     deformed = np.where(holes[..., np.newaxis], np.float32(0), draft.colours)
     stages = {"deformed": deformed, "holes": holes, "completed": colours}
     return Tile(source, colours, float(holes.mean()), draft.mirror, draft.log, stages)
@@ -76,5 +76,5 @@ def mark_elements(draft: Draft, plan: Plan) -> Bools:
     if plan.parts.kind not in ("components", "labels"):
         return np.zeros(draft.covered.shape, bool)
     inside = flip((plan.parts.measure_depth(KEPT) >= 1).astype(np.float32), draft.mirror)
-    shown = gather(inside[..., np.newaxis], draft.coordinates, interpolation="nearest")[..., 0]
+    shown = sample(inside[..., np.newaxis], draft.coordinates, interpolation="nearest")[..., 0]
     return np.asarray(draft.covered & (shown > 0), bool)

@@ -23,7 +23,7 @@ from texrs._typing import Floats, Progress
 from texrs.exemplar.regularity import bend
 from texrs.exemplar.symmetry import flip_frame
 from texrs.growth import stitch_image
-from texrs.kernels.gather import gather
+from texrs.kernels.gather import sample
 from texrs.mosaic import rearrange_cells
 from texrs.papers.design.arguments import DesignRequest
 from texrs.papers.design.canvas import Tile
@@ -164,15 +164,15 @@ def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: DesignRequest) -
             shifts = mirror @ closing @ lattice.vectors
             if any(arguments.wrap):
                 source = bend(source.shape, mirror @ closing @ mirror).compose(source)
-                colours = gather(plan.guide, source.coordinates, interpolation="cubic")
-        shown = gather(depth, source.coordinates, interpolation="nearest")
+                colours = sample(plan.guide, source.coordinates, interpolation="cubic")
+        shown = sample(depth, source.coordinates, interpolation="nearest")
         pictures.append(Picture(colours, source, shown, lattice is not None, shifts))
     return pictures
 
 
 def draw_picture(tile: Tile, depth: Floats) -> Picture:
     """Return a tile as a source of patches, with the depth of the exemplar's pixels inside elements."""
-    return Picture(tile.colours, tile.source, gather(depth, tile.source.coordinates, interpolation="nearest"))
+    return Picture(tile.colours, tile.source, sample(depth, tile.source.coordinates, interpolation="nearest"))
 
 
 def draw_sheets(plan: Plan, tile: Tile, arguments: DesignRequest, seed: int) -> list[Picture]:
@@ -181,7 +181,7 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: DesignRequest, seed: int) -> 
     assert courses is not None
     axis = courses.axis
     level = courses.level(plan.guide.shape[:2]).compose(tile.source)
-    depth = DEEP * measure_stones(courses, gather(plan.guide, level.coordinates, interpolation="cubic"), DEEP)
+    depth = DEEP * measure_stones(courses, sample(plan.guide, level.coordinates, interpolation="cubic"), DEEP)
     sheets = lay_sheets(
         courses,
         level.shape,
@@ -195,8 +195,8 @@ def draw_sheets(plan: Plan, tile: Tile, arguments: DesignRequest, seed: int) -> 
     pictures = []
     for sheet in sheets:
         source = sheet.compose(level)
-        colours = gather(plan.guide, source.coordinates, interpolation="cubic")
-        pictures.append(Picture(colours, source, gather(depth, sheet.coordinates, interpolation="nearest")))
+        colours = sample(plan.guide, source.coordinates, interpolation="cubic")
+        pictures.append(Picture(colours, source, sample(depth, sheet.coordinates, interpolation="nearest")))
     return pictures
 
 
