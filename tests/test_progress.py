@@ -124,7 +124,7 @@ def test_long_stages_are_asked_again_and_again():
 
 def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
     pytest.importorskip("zarr")
-    make = partial(texrs.synthesize, texrs.samples.dots((64, 64)).image, 64)
+    make = partial(texrs.synthesize, texrs.samples.dots((68, 76)).image, 64)
     with pytest.raises(Stop):
         texrs.stores.map_to_zarr(make, [{"seed": 1}, {"seed": 2}], tmp_path / "a.zarr", progress=stop)
     told: list[float] = []
