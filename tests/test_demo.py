@@ -63,7 +63,7 @@ def test_demo_is_one_whole_page(
     out, err = capsys.readouterr()
     assert out == ""
     assert "texrs: Built-in examples" in err
-    assert [p.name for p in Path("new/demo").iterdir()] == ["index.html"]
+    assert {p.name for p in Path("new/demo").iterdir()} == {"index.html", "index.html.json"}
     text = Path("new/demo/index.html").read_text(encoding="utf-8")
     parsed = Page(text)
     assert not parsed.open
