@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -59,6 +60,9 @@ GROUPS: dict[str, dict[str, str]] = {
     },
 }
 """All commands and their purposes by group, as the help shows them."""
+if not Path(__file__).parents[1].joinpath("demo").is_dir():
+    # Wheels do not contain the demo.
+    del GROUPS["Examples"]["demo"]
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 NAMES.update(COMMANDS)
 
