@@ -118,6 +118,8 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         balance: draw.real() * 4.0,
         recover: draw.real(),
         heal: draw.flag(),
+        lattice: (D == 2 && draw.flag())
+            .then(|| [(); 2].map(|()| [(); 2].map(|()| f64::from(draw.real()) * 20.0))),
         seed: draw.any(),
     };
     let Some(found) =

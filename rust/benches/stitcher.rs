@@ -24,6 +24,7 @@ const OPTIONS: Options = Options {
     balance: 4.0,
     recover: 0.5,
     heal: true,
+    lattice: None,
     seed: 1,
 };
 
