@@ -384,6 +384,7 @@ def _measure_deviations(picture: Floats, reach: int, columns: NDArray[np.intp]) 
     columns = np.clip(columns, -picture.shape[1], picture.shape[1])
     left, right = np.maximum(columns, 0), np.minimum(columns, 0) + picture.shape[1]
     lower, upper = sums[-1] - sums[rows], sums[len(picture) - rows]
+    del sums
     # The part that a shift moves onto another one is the other part of the opposite shift.
     product: NDArray[np.float64] = lower[:, right]
     other = upper[:, right[::-1]]
