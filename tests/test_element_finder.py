@@ -277,11 +277,14 @@ def test_one_element_with_two_marks_becomes_two():
 
 def test_marks_that_find_nothing_are_reported():
     plain = np.full((64, 64, 3), 90, np.uint8)
-    with pytest.warns(InputWarning, match="marks: nothing was found"):
-        find_elements(plain, marks=np.eye(64, dtype=int))
+    for image, marks in ((plain, np.eye(64, dtype=int)), (samples.dots((64, 64)).image, np.full((64, 64), -1))):
+        with pytest.warns(InputWarning, match="marks: nothing was found"):
+            assert not find_elements(image, marks=marks).elements
 
 
-@pytest.mark.parametrize("marks", [np.zeros((3, 3), int), np.full((64, 64), -2), np.zeros((64, 64)), 7])
+@pytest.mark.parametrize(
+    "marks", [np.zeros((3, 3), int), np.full((64, 64), -2), np.zeros((64, 64)), 7, np.arange(4096).reshape(64, 64)]
+)
 def test_unsuitable_marks_are_refused(marks):
     with pytest.raises(InvalidInput, match="marks"):
         find_elements(samples.dots((64, 64)).image, marks=marks)

@@ -27,6 +27,8 @@ WORK = 200, 360
 """Least and largest length of the longer side of the reduced image, in pixels."""
 LEAST = 8
 """Length of the shorter side of the reduced image below which nothing is searched for, in pixels."""
+MANY = 1000
+"""Largest number of marked elements. Each is searched for by itself."""
 EMPTY = 0.9
 """Probability of the layout "none" if no candidates exist."""
 RIGHT = 10.14, 8.34, 5.28, -11.99
@@ -191,7 +193,7 @@ def find_elements(
         Shape (H, W) or (H, W, C), any dtype. The first three channels are colours. Transparent pixels are grey.
     marks : array_like of int, optional
         Known pixels, shape (H, W), such as strokes of a pen. Numbers from 1 are those of elements, -1 is the background,
-        and 0 is unknown. A few pixels of each element are enough.
+        and 0 is unknown. A few pixels of each element are enough, and at most 1000 elements have marks.
     seed : int
         Seed of the pixels that the code words are learned from. Default: 0.
     progress : callable or True, optional
@@ -236,6 +238,8 @@ def find_elements(
     known = None if marks is None else as_array(marks, "marks", np.int32, pixels.shape[:2])
     if known is not None and known.min() < -1:
         raise InvalidInput(f"marks: must be -1 (background), 0 (unknown) or numbers of elements, got {known.min()}")
+    if known is not None and (count := len(np.unique(known[known > 0]))) > MANY:
+        raise InvalidInput(f"marks: must have at most {MANY} numbers of elements, got {count}")
     found = _FOUND.get_or_make(
         content_hash(rgb, seed, *([] if known is None else [known])),
         lambda: analyse(rgb, seed, lambda share: watch("elements", share), known),

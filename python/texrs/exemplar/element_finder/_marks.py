@@ -25,8 +25,8 @@ LARGEST = 4.0
 
 def heed_marks(
     elements: Candidates, quality: Values, leaves: Leaves, level: float, marks: Labels
-) -> tuple[Candidates, Values]:
-    """Return the elements and their qualities, changed until they agree with the marks.
+) -> tuple[Candidates, Values] | None:
+    """Return the elements and their qualities, changed until they agree with the marks. None if no element is left.
 
     ``marks`` contain the number of an element at its known pixels, -1 on the background, and 0 where nothing is known.
     """
@@ -50,8 +50,10 @@ def heed_marks(
         sets, rated = ([one for one, keep in zip(each, kept, strict=True) if keep] for each in (left, rated))
         if number > 0:
             sets, rated = [*sets, taken], [*rated, known]
+    if not sets:
+        return None
     starts = np.concatenate([[0], np.cumsum([len(members) for members in sets])]).astype(np.int64)
-    members = np.concatenate([*sets, np.zeros(0)]).astype(np.uint32)
+    members = np.concatenate(sets).astype(np.uint32)
     features, words = measure(leaves, starts, members)
     return Candidates(starts, members, features | {"seam": np.zeros(len(sets))}, words), np.array(rated)
 

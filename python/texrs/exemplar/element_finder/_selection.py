@@ -178,7 +178,10 @@ def choose_reading(contours: Contours, lines: str, fewest: int, marks: Labels | 
     value = measure_value(candidates, quality, chosen)
     elements, rated = join_parts(candidates.pick(picked), quality[picked], leaves)
     if marks is not None:
-        elements, rated = heed_marks(elements, rated, leaves, level, marks)
+        heeded = heed_marks(elements, rated, leaves, level, marks)
+        if heeded is None:
+            return None
+        elements, rated = heeded
     return Choice(grow(elements, leaves, contours), elements, rated, value, score, lines, level, strength)
 
 

@@ -37,7 +37,7 @@ const CHANCE: f32 = 0.1;
 /// Maximum distance from a place in step with the lattice, in samples.
 ///
 /// This and the next value are the first ones tried. On 32 images with a lattice or a period, the
-/// mean irregularity falls from .167 to .056 with them.
+/// mean irregularity falls from 0.167 to 0.056 with them.
 const SLACK: f64 = 3.0;
 /// Cost of a place that is not in step. It is more than that of the exact continuation of a neighbour.
 const OUT_OF_STEP: f32 = 8.0;
