@@ -273,7 +273,7 @@ def read_elements(rgb: Floats, seed: int, watch: Callable[[float], object], mark
     if layout == "separate":
         choice = drop_doubtful(choice)
     with answering(watch, 0.8):
-        labels = refine_outlines(choice.labels, contours, rgb)
+        labels = refine_outlines(choice.labels, contours, rgb, layout == "separate")
     labels.flags.writeable = False
     overlaps = find_overlaps(enlarge(labels, contours.words.shape)) if layout == "heap" else ()
     elements = measure_elements(labels, choice, overlaps)

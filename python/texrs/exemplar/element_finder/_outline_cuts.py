@@ -15,12 +15,20 @@ from texrs.exemplar.element_finder._contour_strength import Contours, blur
 Labels = NDArray[np.int32]
 Number = TypeVar("Number", bound=np.generic)
 
-BAND = 0.16
-"""Half width of the band around an outline that the new outline stays in, as a share of the side of the element."""
+BAND = 0.25
+"""Half width of the band around an outline that the new outline stays in, as a share of the side of the element.
+
+With 0.16 the outlines of ten drawn images are 1.57 pixels from the drawn ones, with 0.25 1.52, and with 0.35 1.52.
+"""
 PULL = 0.6
 """Evidence that holds an outline in place at the edge of the band.
 
 With 1.5 instead of 0.3 the mean IoU is 0.01 lower, and the mean F 0.01 higher.
+"""
+OUTWARDS = 0.05
+"""Evidence for the inside of an element on a background, for the outer one of two contours, such as that of a rim.
+
+With 0 the outlines are 1.52 pixels from the drawn ones, with 0.02 1.50, with 0.05 1.49, and with 0.1 1.53.
 """
 WORDS = 0.1
 """Weight of code words. The mean IoU of 20 images is 0.839 with 0.1, 0.833 with 0, and 0.829 with 0.2."""
@@ -34,8 +42,11 @@ STRIP = 128
 """Number of rows that are processed at once. It has no influence on the result."""
 
 
-def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
-    """Return labels at the size of `rgb` whose outlines lie on contours. `labels` are at the reduced size."""
+def refine_outlines(labels: Labels, contours: Contours, rgb: Floats, separate: bool) -> Labels:
+    """Return labels at the size of `rgb` whose outlines lie on contours. `labels` are at the reduced size.
+
+    `separate` elements lie on a background.
+    """
     shape = rgb.shape[0], rgb.shape[1]
     contrast = measure_contrast(rgb, max(1.0, max(shape) / max(contours.words.shape)))
     price = contrast
@@ -45,6 +56,8 @@ def refine_outlines(labels: Labels, contours: Contours, rgb: Floats) -> Labels:
     np.reciprocal(price, out=price)
     price += CLEAREST
     evidence = weigh_words(labels, contours)
+    if separate:
+        evidence += OUTWARDS
     if labels.shape != shape:
         labels, evidence = enlarge(labels, shape), enlarge(evidence, shape)
     side = np.sqrt(np.bincount(labels.ravel(), minlength=int(labels.max()) + 1))
