@@ -90,6 +90,22 @@ def test_the_map_renders_the_picture(interpolation):
     check_seen(made, WEAVE)
 
 
+@pytest.mark.parametrize("field", [None, fields.constant([[0.8, -0.6], [0.6, 0.8]])], ids=["straight", "turned"])
+def test_patches_of_an_image_are_in_step_with_its_lattice(field):
+    rows, columns = np.indices((130, 140))
+    noise = np.random.default_rng(0).normal(0, 0.1, rows.shape)
+    light = 0.5 + 0.1 * (np.cos(2 * np.pi * rows / 26) + np.cos(2 * np.pi * columns / 26) + noise)
+    studs = np.repeat(light[..., None], 3, axis=2).astype(np.float32)
+    made = texrs.synthesize(studs, (180, 190), field=field)
+    assert made.report["in_step"]
+    assert len(np.unique(made.source_map.label)) > 2
+    frame = np.eye(2) if field is None else field.jacobians(np.zeros((1, 2)))[0]
+    moved = (made.source_map.coordinates - np.moveaxis(np.indices((180, 190)), 0, -1) @ frame.T) / 26
+    assert np.abs(moved - np.rint(moved)).max() < 0.2
+    # Given points and periodic outputs decide where patches are.
+    assert not texrs.synthesize(studs, 96, wrap=True).report["in_step"]
+
+
 def test_labels_are_classes_without_an_order():
     marked = (np.cumsum(np.random.default_rng(0).random((24, 24, 24)) < 0.06, axis=0) % 5).astype(np.uint8)
     made = texrs.solid(marked, 32, field=TURNING, quality="fast")

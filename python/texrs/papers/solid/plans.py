@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._arrays import as_choice
 from texrs.errors import InvalidInput
@@ -36,8 +37,15 @@ class Plan:
     plain: bool = False
     """If True, elements do not change the costs of seams."""
 
-    def start(self, exemplar: Exemplar, seed: int, quality: Quality, bend: bool | None) -> Start:
-        """Return the start of the engine that stitches patches by this method."""
+    def start(
+        self,
+        exemplar: Exemplar,
+        seed: int,
+        quality: Quality,
+        bend: bool | None,
+        lattice: NDArray[np.float64] | None,
+    ) -> Start:
+        """Return the start of the engine that stitches patches by this method, in step with a lattice if it is given."""
         return from_patches(
             exemplar,
             0,
@@ -46,6 +54,7 @@ class Plan:
             bend=bend,
             larger=self.larger,
             plain=self.plain,
+            lattice=lattice,
         )
 
 
