@@ -26,7 +26,7 @@ PULL = 0.6
 With 1.5 instead of 0.3 the mean IoU is 0.01 lower, and the mean F 0.01 higher.
 """
 OUTWARDS = 0.05
-"""Evidence that pixels are inside an element on a background. Of two contours, such as those of a rim, the outer one wins.
+"""Evidence for the inside of an element on a background. The outer one of two contours, such as those of a rim, wins.
 
 With 0 the outlines are 1.52 pixels from the drawn ones, with 0.02 1.50, with 0.05 1.49, and with 0.1 1.53.
 """
