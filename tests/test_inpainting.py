@@ -16,6 +16,8 @@ from texrs.exemplar.symmetry import NONE
 from texrs.inpainting._judge import Filled, judge_seams
 from texrs.inpainting._patches import MARGIN, PLACES, choose_mirrors, choose_part
 from texrs.inpainting._scene import Scene
+from texrs.kernels.inpaint import inpaint as kernel
+from texrs.kernels.patch_search import PatchIndex
 
 PEBBLES = samples.pebbles((96, 112)).image
 
@@ -403,6 +405,36 @@ def test_same_bytes_for_any_number_of_threads():
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source_map.coordinates.tobytes() == made[0].source_map.coordinates.tobytes()
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+def test_patches_are_in_step_with_a_lattice(wrap):
+    rng, (rows, columns) = np.random.default_rng(5), np.indices((156, 182))
+    # Each stud has its own brightness, so patches that fit best need not be in step.
+    light = rng.uniform(0.3, 1.0, (7, 8))[(rows + 13) // 26 % 6, (columns + 13) // 26 % 7]
+    light *= np.hypot((rows + 13) % 26 - 13, (columns + 13) % 26 - 13) < 8
+    studs = (light + rng.normal(0, 0.02, light.shape)).astype(np.float32)
+    hole = disc(studs.shape, radius=0.25)
+    result = texrs.inpaint(studs, hole, wrap=wrap)
+    assert result.report["in_step"]
+    moved = (result.source_map.coordinates - np.moveaxis(np.indices(studs.shape), 0, -1))[hole] / 26
+    assert np.abs(moved).max() > 0.5
+    assert np.abs(moved - np.rint(moved)).max() < 0.15
+    # This lattice does not continue beyond the borders.
+    assert not texrs.inpaint(studs[:143], hole[:143], wrap=True).report["in_step"]
+    assert not texrs.inpaint(PEBBLES, HOLE).report["in_step"]
+
+
+@pytest.mark.parametrize(
+    ("lattice", "shown", "reason"),
+    [([[1, 2], [2, 4]], 0, "span"), ([[8, 0], [0, 8]], None, "shown"), ([[1, np.nan], [0, 1]], 0, "finite")],
+)
+def test_bad_lattices_are_refused(lattice, shown, reason):
+    image = np.ones((24, 24, 1), np.float32)
+    known = np.ones((24, 24), bool)
+    known[8:12, 8:12] = False
+    with pytest.raises(InvalidInput, match=f"lattice.*{reason}"):
+        kernel(image, known, PatchIndex([image]), patch_size=8, lattice=lattice, shown=shown)
 
 
 def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():

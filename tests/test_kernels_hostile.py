@@ -107,6 +107,7 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
             "seed": 1,
             "paper": False,
             "shown": 0,
+            "lattice": None,
             "progress": None,
         },
     ),

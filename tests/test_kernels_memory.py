@@ -25,8 +25,9 @@ KERNELS = {
     "labels": "_rust.seam_labels(two, (one, one), (one, one), (False, False))",
     "strip": "_rust.seam_strips([(image, other, 1, None)], False, 'gradient')",
     "distance": "_rust.outlines(disc.astype(np.int32), [(1, (0, 0), (1024, 1024))])",
-    "complete": "_rust.complete(image, holes, None, patches, (False, False), (16, 16), (3, 2, 3.0), 0, False, None, None)",
-    "complete as printed": "_rust.complete(image, holes, None, patches, (True,) * 2, (16, 16), (1, 0, 9), 0, True, None, None)",
+    "complete": "_rust.complete(*hole, patches, *plain, (16, 16), (3, 2, 3.0), 0, False, None, None, None)",
+    "complete in step": "_rust.complete(*hole, itself, *plain, (16, 16), (3, 2, 3.0), 0, False, 0, studs, None)",
+    "complete as printed": "_rust.complete(*hole, patches, (True,) * 2, (16, 16), (1, 0, 9), 0, True, None, None, None)",
     "appearance": "_rust.Appearance(small, (256, 256), (False, False), 2)",
     "blocks": "looks.blocks(region, still, 16, 1, 1, 0.5, 0.5, 0.1, 1, 0, none, no_places, None, None)",
     "optimize": "looks.correct(start, region, still, none, 1, 0, False, 1, 0.1, 0.1, 1, 0.0, 1, None, None)",
@@ -74,6 +75,8 @@ points = places.reshape(-1, 2).astype(np.float32)
 holes = np.ones((side, side), bool)
 holes[40:60, 40:60] = False
 patches = _rust.PatchIndex([image[:64, :64].copy()], [None], (16, 16))
+itself = _rust.PatchIndex([image], [None], (16, 16))
+hole, plain, studs = (image, holes, None), ((False, False),), [[30, 0], [0, 30]]
 flat = image.reshape(-1, 3)
 small = image[:256, :256].reshape(-1, 3)
 looks = _rust.Appearance(image[:32, :32].reshape(-1, 3), (32, 32), (False, False), 2)

@@ -144,6 +144,7 @@ def complete(
     seed: int,
     paper: bool,
     shown: int | None,
+    lattice: Sequence[Sequence[float]] | None,
     progress: Callable[[float], object] | None,
 ) -> tuple[NDArray[float32], NDArray[int32], NDArray[int64]]: ...
 def decode_image(name: str, file: bytes, limit: int) -> tuple[NDArray[uint8], str, tuple[int, int, int], int]: ...

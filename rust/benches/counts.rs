@@ -89,6 +89,7 @@ fn completion() {
         seed: 0,
         paper: false,
         shown: None,
+        lattice: None,
     };
     let mut canvas = Canvas {
         grid: Grid::new([side; 2], [false; 2]).unwrap(),

@@ -50,6 +50,7 @@ pub(crate) fn bench(c: &mut Criterion) {
                 seed: 0,
                 paper,
                 shown: None,
+                lattice: None,
             };
             for threads in [1, 2] {
                 let id = BenchmarkId::new(format!("{name} {side}"), threads);

@@ -152,6 +152,7 @@ def inpaint(
         - ``candidates``: Sides of patches that were tried, each with the cost of its seams. For volumes, the cost is
           the step at the border of the hole, relative to steps elsewhere.
         - ``patches``: Number of patches.
+        - ``in_step``: Whether patches were in step with a lattice of the image. They are then not mirrored.
         - ``allow_mirror``: Whether patches could be mirrored.
         - ``screening``: Weight of the values in the colour correction.
         - ``wrap``: Whether the image repeats along (rows, columns).
@@ -307,6 +308,7 @@ def inpaint(
         "patch_size": round(made.side, 3),
         "candidates": [[s, round(shown, 3)] for s, shown in made.tried],
         "patches": count,
+        "in_step": made.in_step,
         "allow_mirror": len(mirrors) > 1,
         "screening": screening,
         "wrap": list(cyclic),

@@ -26,6 +26,8 @@ class Filling:
     """Sides that were tried, each with the visibility of the seams."""
     whole: bool
     """If True, all coordinates are integers."""
+    in_step: bool = False
+    """Whether patches are in step with a lattice of the image."""
 
 
 def fill(
@@ -87,7 +89,7 @@ def fill(
         if deep is not None:
             source, side, count = deep
             return Filling(source, side, count, [], False)
-    source, whole_side, tried = fill_with_patches(
+    source, whole_side, tried, in_step = fill_with_patches(
         pictures,
         open_,
         scales,
@@ -99,4 +101,4 @@ def fill(
         seed=seed,
         watch=progress or (lambda stage, share: None),
     )
-    return Filling(source, whole_side, int(source.label.max()), tried, True)
+    return Filling(source, whole_side, int(source.label.max()), tried, True, in_step)

@@ -8,12 +8,16 @@ whose seams are least visible is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from texrs._arrays import as_image, guidance, log_single
+from texrs._arrays import as_image, as_rgb, guidance, log_single
+from texrs._progress import answering
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
+from texrs.exemplar.courses import find_regularity
 from texrs.exemplar.patches import choose_usual_side, mark_corners
 from texrs.exemplar.symmetry import ALL, NONE, Flip, find_mirrors
 from texrs.inpainting._judge import Filled, judge_seams
@@ -53,6 +57,8 @@ PLENTY = 2
 
 With fewer pixels, the whole image is used.
 """
+DRIFT = 3.0
+"""Maximum distance of opposite borders of a periodic image from a shift of its lattice, in pixels."""
 LARGE = 160**2
 """Area in pixels above which sizes are tried in a copy of half the size or less."""
 SMALLEST = 64
@@ -71,18 +77,19 @@ def fill_with_patches(
     wrap: tuple[bool, bool],
     seed: int,
     watch: Progress,
-) -> tuple[SourceMap, int, list[tuple[int, float]]]:
-    """Fill a hole with patches.
+) -> tuple[SourceMap, int, list[tuple[int, float]], bool]:
+    """Fill a hole with patches. If the filled image has a lattice, fill the hole again in step with it.
 
     Returns
     -------
     SourceMap
         The source map of the image without holes.
-
     int
         The side of the patches.
     list of (int, float)
-        The sides that were tried, each with the visibility of its seams.
+        The tried sides. Each has the visibility of its seams.
+    bool
+        True if patches are in step with a lattice.
 
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
@@ -94,25 +101,51 @@ def fill_with_patches(
     known, itself = ~open_[part], len(pictures) == 1
     free = usable[part] if itself else np.ones(shapes[-1], bool)
     scene = Scene(guides[0], known, keep[part], guides[-1], free, cyclic)
-    tried: list[tuple[int, float]] = []
-    made: Filled | None = None
     if chosen is not None:
         check_places(free, chosen)
-        side = chosen
     elif scales is not None:
         # If scales differ across the image, they also differ within a large patch, so smaller patches are used.
-        side = list_sides(scene, choose_usual_side(min(free.shape)), (1.0,))[0]
-    else:
-        side, tried, made = try_sides(scene, mirrors, seed, lambda share: watch("inpaint", 0.5 * share))
-    if made is None:
-        made = scene.fill(side, mirrors, seed, lambda share: watch("inpaint", 0.5 + 0.5 * share))
+        chosen = list_sides(scene, choose_usual_side(min(free.shape)), (1.0,))[0]
+    side, tried, made = fill_scene(scene, chosen, mirrors, seed, lambda share: watch("inpaint", 0.5 * share))
+    if itself and scales is None:
+        with answering(watch, "inpaint", 0.5):
+            lattice = find_lattice(made.colours, cyclic)
+        if lattice is not None:
+            scene = replace(scene, lattice=lattice)
+            side, tried, made = fill_scene(
+                scene, chosen, mirrors, seed, lambda share: watch("inpaint", 0.5 + 0.5 * share)
+            )
     new = np.nonzero(made.label)
     corner = np.array([p.start for p in part], np.float32)
     source = map_untouched(shapes)
     source.coordinates[part][new] = made.coordinates[new] + (corner if itself else 0)
     source.exemplar[part][new] = len(shapes) - 1
     source.label[part] = made.label
-    return SourceMap(source.coordinates, source.exemplar, source.label, made.frames, shapes), side, tried
+    filled = SourceMap(source.coordinates, source.exemplar, source.label, made.frames, shapes)
+    return filled, side, tried, scene.lattice is not None
+
+
+def fill_scene(
+    scene: Scene, chosen: int | None, mirrors: Sequence[Flip], seed: int, watch: Callable[[float], object]
+) -> tuple[int, list[tuple[int, float]], Filled]:
+    """Fill holes with patches of a given side, or else of the best one. Return the side, all tried sides and the result."""
+    tried: list[tuple[int, float]] = []
+    made: Filled | None = None
+    if chosen is None:
+        chosen, tried, made = try_sides(scene, mirrors, seed, lambda share: watch(0.5 * share))
+    if made is None:
+        made = scene.fill(chosen, mirrors, seed, lambda share: watch(0.5 + 0.5 * share))
+    return chosen, tried, made
+
+
+def find_lattice(colours: Floats, wrap: tuple[bool, bool]) -> NDArray[np.float64] | None:
+    """Return the lattice of an image, with a shift in each column. None if there is none, or if it does not wrap."""
+    lattice, _ = find_regularity(as_rgb(colours))
+    size = colours.shape[0], colours.shape[1]
+    closing = None if lattice is None else lattice.close(size, wrap)
+    if lattice is None or closing is None or np.abs(closing - np.eye(2)).max() * max(size) > DRIFT:
+        return None
+    return lattice.vectors
 
 
 def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None) -> tuple[Flip, ...]:

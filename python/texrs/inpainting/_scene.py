@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 from texrs.exemplar.patches import index_patches, place_patches
@@ -31,6 +32,8 @@ class Scene:
     """Mask of the pixels of ``source`` that may be copied, (h, w)."""
     wrap: tuple[bool, bool]
     """Axes along which the image is periodic."""
+    lattice: NDArray[np.float64] | None = None
+    """Lattice of the image that patches are kept in step with, (2, 2), with a shift in each column."""
     _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)
     """Index of each set of mirror images. It serves all sizes of patches."""
 
@@ -54,6 +57,7 @@ class Scene:
             colours if self.itself else _average(self.source),
             _all_four(self.free),
             self.wrap,
+            None if self.lattice is None else self.lattice / 2,
         )
 
     def fill(self, side: int, mirrors: Sequence[Flip], seed: int, progress: Callable[[float], object]) -> Filled:
@@ -70,6 +74,7 @@ class Scene:
             wrap=self.wrap,
             seed=seed,
             shown=0 if self.itself else None,
+            lattice=self.lattice,
             progress=progress,
         )
         new, coordinates, jacobians = place_patches(filled, mirrors, (self.free.shape[0], self.free.shape[1]))

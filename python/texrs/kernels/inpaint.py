@@ -71,6 +71,7 @@ def inpaint(
     seed: int = 0,
     paper: bool = False,
     shown: int | None = None,
+    lattice: Array | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Inpainting:
     """Fill the unknown pixels of an image patch by patch, from the boundary of the hole inwards.
@@ -113,6 +114,9 @@ def inpaint(
         Index in ``index`` of the exemplar that is this image itself, if there is one. The surroundings of a hole are
         then not copied or mirrored into the hole from this exemplar. Patches never repeat their neighbours, and mirror
         images in ``index`` are recognised. Default: None.
+    lattice : (2, 2) array_like of float, optional
+        Lattice of the image ``shown``: two shifts after which it repeats, (row, column), one in each column. Patches are
+        then copied from places in step with it, as long as there are any. Default: None.
     progress : callable, optional
         Function that is called with the filled fraction of the holes, 0 to 1. An exception that it raises stops the
         work. Default: None.
@@ -174,6 +178,7 @@ def inpaint(
         as_seed(seed),
         as_bool(paper, "paper"),
         None if shown is None else as_int(shown, "shown", 0, len(index.shapes) - 1),
+        None if lattice is None else as_array(lattice, "lattice", np.float64, (2, 2)).tolist(),
         as_progress(progress),
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)

@@ -33,6 +33,7 @@ pub(super) fn inpaint<'py>(
     seed: u64,
     paper: bool,
     shown: Option<usize>,
+    lattice: Option<[[f64; 2]; 2]>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Filled<'py>> {
     let &[rows, columns, channels] = colours.shape() else {
@@ -56,6 +57,7 @@ pub(super) fn inpaint<'py>(
         seed,
         paper,
         shown,
+        lattice,
     };
     let index = &index.0;
     let filled = run(py, progress, |monitor| {

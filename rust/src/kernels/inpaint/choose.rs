@@ -9,6 +9,7 @@ use super::window::Window;
 use super::{Options, Patch};
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
+use crate::foundation::lattice::away;
 use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Pick};
 use crate::{Error, Result};
@@ -27,6 +28,8 @@ const SPARE: usize = 2;
 /// Maximum number of matches whose cuts are computed. A cut takes longer than a search, and a worse match seldom gives
 /// a better cut.
 const TRIED: usize = 3;
+/// Maximum distance of a place from the nearest one in step with the lattice, in pixels.
+const SLACK: f64 = 3.0;
 
 /// Chooses among the positions of the exemplars.
 pub(super) struct Chooser<'a> {
@@ -65,7 +68,12 @@ impl<'a> Chooser<'a> {
                     count: pick.count.saturating_mul(SPARE),
                     ..pick
                 };
-                let found = self.index.good(&query, &wider, monitor)?;
+                let places = self.in_step(window.shape, to);
+                let found = if places.is_empty() {
+                    self.index.good(&query, &wider, monitor)?
+                } else {
+                    self.index.best_among(&query, &places, &wider)?
+                };
                 let price = |m: &Match| m.cost * (1.0 + self.charge(m, to, pasted));
                 let mut priced: Vec<_> = found.into_iter().map(|m| (price(&m), m)).collect();
                 // The sort is stable, so ties stay in the order of the search.
@@ -78,6 +86,25 @@ impl<'a> Chooser<'a> {
             return anywhere(self.index, window.shape, self.options.seed, pasted.len());
         }
         Ok(found)
+    }
+
+    /// Returns the allowed places for a patch that are in step with the lattice, or nothing without a lattice.
+    fn in_step(&self, shape: [usize; 2], to: [usize; 2]) -> Vec<[usize; 3]> {
+        let (Some(lattice), Some(exemplar)) = (&self.options.lattice, self.options.shown) else {
+            return Vec::new();
+        };
+        let of = &self.index.exemplars()[exemplar];
+        let [rows, columns] = [0, 1].map(|axis| (of.shape[axis] + 1).saturating_sub(shape[axis]));
+        let places = (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column]));
+        let fits = |&[row, column]: &[usize; 2]| {
+            let moved = [row as f64 - to[0] as f64, column as f64 - to[1] as f64];
+            away(lattice, moved) <= SLACK
+                && (of.allowed.as_ref()).is_none_or(|a| a[row * of.shape[1] + column])
+        };
+        places
+            .filter(fits)
+            .map(|[row, column]| [exemplar, row, column])
+            .collect()
     }
 
     /// Returns the relative increase of the cost of a match. It grows with the share of the match that its

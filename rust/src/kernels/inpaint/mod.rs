@@ -64,6 +64,9 @@ pub struct Options {
     /// Index of the exemplar that equals the known part of the canvas, if there is one. Matches that repeat the
     /// surroundings of a hole then cost more.
     pub shown: Option<usize>,
+    /// Lattice of the image `shown`, with a shift in each column. If given, patches are copied from places of it that
+    /// are in step with the lattice, as long as there are any.
+    pub lattice: Option<[[f64; 2]; 2]>,
 }
 
 /// A pasted patch.
@@ -111,7 +114,9 @@ pub fn inpaint(
     let [rows, columns] = canvas.grid.shape();
     let Options { patch, paper, .. } = *options;
     // Check the arguments.
-    memory::room("the inpainting", canvas.grid.len(), 32)?;
+    // Places in step with a lattice are listed, and scored, all at once.
+    let each = if options.lattice.is_some() { 96 } else { 32 };
+    memory::room("the inpainting", canvas.grid.len(), each)?;
     if canvas.channels != index.channels() {
         let message = format!(
             "must have {1} channels like the exemplars, got {0}",
@@ -162,6 +167,15 @@ pub fn inpaint(
             [rows, columns]
         );
         return Err(Error::value("shown", message));
+    }
+    if let Some([[a, b], [c, d]]) = options.lattice {
+        let area = a * d - b * c;
+        if !area.is_finite() || area.abs() < 1.0 || options.shown.is_none() {
+            return Err(Error::value(
+                "lattice",
+                "must have finite columns that span at least a pixel, and needs shown",
+            ));
+        }
     }
     // Prepare the search, the stitchers and the order of the unknown pixels.
     let mut result = Inpainting {
