@@ -91,7 +91,7 @@ class DesignRequest(Request):
     - ``screening`` (float, optional): Weight of the original values when colours are corrected to hide seams, 0 to
       1e6 (section 3.6). A smaller weight spreads the correction farther from the seams. If None or 0, colours are
       not corrected. `texrs.blend` corrects other maps in the same way, with ``across=False`` if there are several
-      exemplars. Default: 0.15.
+      exemplars. Default: 0.02.
     - ``method`` ({None, "paper"}): Algorithm to use. "paper" is the algorithm as printed, for comparison, with
       only its misprints repaired. It moves whole colour layers, once each or ``operations`` times. It stitches
       them at the cost of the paper, fills holes with the best match, and corrects colours without a weight on the

@@ -26,6 +26,7 @@ from texrs._requests import (
     truth,
 )
 from texrs._typing import Array, Progress
+from texrs.blending import SCREENING
 from texrs.elements import ElementAnalysis, analyse
 from texrs.elements.arguments import as_points
 from texrs.errors import InvalidInput, LimitExceeded
@@ -42,11 +43,6 @@ FEWEST = 3
 SHORTEST = 16
 Method: TypeAlias = Literal["paper", "preview"] | None
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
-SCREENING = 0.01
-"""Default weight of the original values in the colour correction.
-
-It evens out light that changes slowly.
-"""
 CACHES: list[Cache[bytes, Any]] = []
 """All caches that `remember` created."""
 
@@ -93,7 +89,7 @@ class Splice(Request):
     - ``screening`` (float, optional): Weight of the original values when colours are corrected at the borders between
       elements and background, 0 to 1e6, see `texrs.blend`. This only affects separate elements on their background. A
       texture that is lit from one side gives a result that is lit in the same way. None or 0: colours are not
-      corrected, and the image is the texture at the coordinates of the source map. Default: 0.01.
+      corrected, and the image is the texture at the coordinates of the source map. Default: 0.02.
     """
 
     elements: Word[ElementAnalysis | Material | Array, Any] = Word(as_given)
@@ -189,7 +185,7 @@ class SelfSplice(Request):
       visible background is too small, are deformed. Default: True.
     - ``screening`` (float, optional): Weight of the original values when colours are corrected where moved elements
       meet the background, 0 to 1e6, as in `splice`. This only affects separate elements on their background. None or
-      0: colours are not corrected. Default: 0.01.
+      0: colours are not corrected. Default: 0.02.
     """
 
     elements: Word[ElementAnalysis | Material | Array, Any] = Word(as_given)
