@@ -44,6 +44,9 @@ Departures from the paper, with their reasons:
 - The child layers are the elements that `texrs.exemplar.element_finder` finds, instead of segments of colour layers. If
   an example has no elements, or if they are the meshes of a net, a jittered grid of cells takes their place.
 
+- An example that clearly shows an oblique plane is flattened first, because elements from its near and far parts do not
+  fit each other (`texrs.papers.design.oblique`).
+
 - Several ways are tried at a small size (`texrs.papers.design.ways`), and the one with the fewest faults is used. The
   faults are measured without a segmentation: lost regularity, lines that break off, foreign content, and steps of
   tone. The paper always moves elements, which tears those that are close together.
@@ -85,15 +88,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
+from texrs._progress import answering
 from texrs._typing import Progress
 from texrs._verbs import verb
 from texrs.errors import InvalidInput
 from texrs.papers.design.arguments import Design, DesignRequest, DesignVariants
+from texrs.papers.design.oblique import flatten_exemplar
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
-from texrs.papers.design.texture import correct_colours, look_up
+from texrs.papers.design.texture import correct_colours, look_up, say_finish
 from texrs.papers.design.trials import choose_other, choose_plan, make_composite
+from texrs.planes.flat import FlatView
 from texrs.synthesis import Synthesis
 from texrs.tiling.check import check_result, report_tiling
 
@@ -157,6 +163,8 @@ def design(asked: Design) -> Synthesis:
         - ``seams``: Visibility of the seams ``before`` and ``after`` the correction. It consists of the number of
           ``edges`` (pairs of pixels), the ``mean`` difference (1 is the mean of the example) and the share of
           ``outliers``.
+        - ``flattened``: The plane that the example was found to show obliquely, as `texrs.planes.Plane.as_dict`. The
+          example is then flattened first, if ``way`` and ``elements`` have their defaults. Otherwise None.
         - ``operations``: For each copy, the operations on each element. An entry contains the ``element``, its
           ``operations`` and, if the element replaces another one, the translation to its ``place`` in pixels.
         - ``tiling``: Result of `texrs.check_tiling` for each axis that wraps: ``tiles``, ``seam`` and ``place``.
@@ -241,9 +249,13 @@ def design_variants(asked: DesignVariants) -> Iterator[Synthesis]:
 
 def make_textures(arguments: DesignRequest) -> Iterator[Synthesis]:
     """Segment the exemplars, and synthesise a texture for each seed."""
-    plans = segment(arguments)
+    with answering(arguments.watch, "segment", 0.0):
+        flat, view = flatten_exemplar(arguments)
+    plans = segment(flat)
     for number, seed in enumerate(arguments.seeds, start=1):
-        made = make_texture(plans, arguments, seed)
+        made = make_texture(plans, flat, seed)
+        if view is not None:
+            made = refer_to_view(made, view, arguments)
         if number == len(arguments.seeds):
             arguments.watch("done", 1.0)
         yield made
@@ -283,6 +295,15 @@ def make_texture(plans: Sequence[Plan], arguments: DesignRequest, seed: int) -> 
         found = check_result(image, None, arguments.wrap, regular=plans[0].parts.repeats is not None)
         report["tiling"] = report_tiling(found, arguments.wrap)
     return Synthesis(image, composite, draw_stages(plans[0], tiles[0], picture), report)
+
+
+def refer_to_view(made: Synthesis, view: FlatView, arguments: DesignRequest) -> Synthesis:
+    """Return a texture of a flattened exemplar as a texture of the exemplar itself."""
+    source = say_finish(made.source_map.compose(view.source), arguments)
+    picture = look_up(source, arguments)
+    image, seams = correct_colours(source, picture, arguments)
+    report = {**made.report, "seams": seams, "flattened": view.plane.as_dict()}
+    return Synthesis(image, source, {**made.stages, "before_blending": picture}, report)
 
 
 def report_share(watch: Progress, number: int, count: int, stage: str, share: float) -> None:

@@ -74,6 +74,7 @@ def describe(
         "holes": [t.holes for t in tiles],
         "screening": arguments.screening,
         "seams": seams,
+        "flattened": None,
         "operations": [t.log for t in tiles],
     }
 
