@@ -179,7 +179,7 @@ def test_a_lattice_closes_at_sizes_larger_than_the_picture():
     assert (made.report["way"], made.report["refused"]) == ("lattice", {})
     # Five periods fit the result along each axis, so they are 41 and 57 pixels long.
     off = np.abs(made.image - np.roll(made.image, (41, 57), (0, 1))).mean()
-    assert off < 0.15 * made.image.std(), off / made.image.std()
+    assert off < 0.2 * made.image.std(), off / made.image.std()
 
 
 def test_a_lattice_that_would_change_too_much_is_not_closed():

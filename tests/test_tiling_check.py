@@ -142,7 +142,7 @@ def test_a_source_map_has_the_size_of_the_image():
 
 
 def test_another_joint_is_taken_if_a_seam_is_visible(monkeypatch):
-    image = samples.pebbles((192, 192), seed=2).image
+    image = samples.pebbles((192, 192), seed=0).image
     first = texrs.tile(image)
     # Call the boldest seam of this result visible.
     seen = 0.99 * tiling.find_boldest(first)
@@ -229,9 +229,10 @@ def test_pixels_far_from_the_border_stay_where_they_are(name):
     image = picture(name, 192)
     made = texrs.tile(image)
     rows, columns = made.image.shape[:2]
-    middle = slice(rows // 4, rows * 3 // 4), slice(columns // 4, columns * 3 // 4)
-    if any(made.report["overlap"]):
-        middle = tuple(slice(overlap, None) for overlap in made.report["overlap"])
+    middle = tuple(
+        slice(overlap, None) if overlap else slice(n // 4, n * 3 // 4)
+        for overlap, n in zip(made.report["overlap"], (rows, columns), strict=True)
+    )
     np.testing.assert_array_equal(made.image[middle], image[:rows, :columns][middle])
     assert made.report["in_place"] >= 0.4
 

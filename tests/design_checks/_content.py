@@ -32,7 +32,7 @@ class D5:
 
     Two lattices in phase do not differ by more.
     """
-    least_median: float = 0.8
+    least_median: float = 0.7
     least_pair: float = 0.5
     least_exemplar: float = 0.4
     least_moved: float = 0.2

@@ -52,7 +52,9 @@ def list_ways(plan: Plan, size: tuple[int, int], wrap: tuple[bool, bool]) -> lis
     """Return the ways that are tried for an exemplar, for textures of a size."""
     ways: list[Way] = ["move", "courses", "lattice", "still", "stitch", "cells", "sow"]
     if plan.parts.courses:
-        return ["courses"]
+        # Elements that move, and a lattice, would break the courses.
+        ways = ["courses", "still", "stitch", "cells"]
+        return [way for way in ways if not find_obstacle(plan, way, size, wrap)]
     if plan.parts.kind == "grid":
         # Moved cells of a grid show more seams than patches, and nothing else.
         ways.remove("move")
