@@ -18,7 +18,7 @@ from texrs.blending import apply
 from texrs.materials import Material
 from texrs.planes import Plane, PlaneView
 from texrs.planes.choose import see
-from texrs.planes.flat import SMALLEST, flatten
+from texrs.planes.flattening import SMALLEST, flatten
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import tile

@@ -164,7 +164,7 @@ def blend(
     >>> int(np.diff(source.render(ramp)[8].astype(int)).max())
     42
     >>> int(np.diff(texrs.blend(source, ramp, wrap=False)[8].astype(int)).max())
-    10
+    6
 
     """
     progress = listen(progress)

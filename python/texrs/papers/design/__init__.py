@@ -99,7 +99,7 @@ from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
 from texrs.papers.design.texture import correct_colours, look_up, say_finish
 from texrs.papers.design.trials import choose_other, choose_plan, make_composite
-from texrs.planes.flat import FlatView
+from texrs.planes.flattening import FlatView
 from texrs.synthesis import Synthesis
 from texrs.tiling.check import check_result, report_tiling
 

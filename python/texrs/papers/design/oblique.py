@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.papers.design.arguments import DesignRequest
 from texrs.planes import Plane, find
-from texrs.planes.flat import FlatView, flatten
+from texrs.planes.flattening import FlatView, flatten
 
 __all__ = ["flatten_exemplar"]
 
