@@ -56,8 +56,8 @@ FAVOURED = {"still": 0.8, "lattice": 0.8, "courses": 0.6, "stitch": 0.8}
 
 Readers graded all ways of 64 pictures, from 0 to 2. This factor and `EQUAL` were chosen on 32 of them. On the other 32
 the mean grade of the way taken is 1.17, of at most 1.33. It is the best way or as good for 72 %. Without the factor of
-"stitch" and with `EQUAL` 0.02, these are 1.14 and 62 %. Courses that were found are used unless another way is much
-better: four generated walls need a factor below 0.65, and a wall that is not in courses needs one above 0.55.
+"stitch" and with `EQUAL` 0.02, these are 1.14 and 62 %. Courses are used unless another way is much better. Four
+generated walls in courses need a factor below 0.65. A wall that is not in courses needs one above 0.55.
 """
 EQUAL = 0.05
 """Difference of scores below which two ways are equally good."""
