@@ -152,7 +152,7 @@ def inpaint(
         - ``candidates``: Sides of patches that were tried, each with the cost of its seams. For volumes, the cost is
           the step at the border of the hole, relative to steps elsewhere.
         - ``patches``: Number of patches.
-        - ``in_step``: Whether patches were in step with a lattice of the image. They are then not mirrored.
+        - ``in_step``: Whether patches are in step with a lattice, without mirror images.
         - ``allow_mirror``: Whether patches could be mirrored.
         - ``screening``: Weight of the values in the colour correction.
         - ``wrap``: Whether the image repeats along (rows, columns).

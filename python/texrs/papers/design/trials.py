@@ -41,8 +41,11 @@ TILES = 2
 """Maximum number of deformed copies of the exemplar that a trial is stitched from."""
 VARIED: tuple[Way, ...] = ("move", "sow")
 """Ways whose tiles all differ. The tiles of the other ways are mirror images of the exemplar."""
-MIRRORED: tuple[Way, ...] = ("move", "still", "lattice", "courses")
-"""Ways that use mirror images of the exemplar if they are permitted."""
+MIRRORED: tuple[Way, ...] = ("move", "still", "lattice")
+"""Ways that use mirror images of the exemplar if they are permitted, and that give way to others if they are equally good.
+
+"courses" uses them along the courses only, and keeps joints that other ways break.
+"""
 NEW: tuple[Way, ...] = ("cells", "sow")
 """Ways with a new arrangement, which need a texture of some size."""
 BENT = 0.6
